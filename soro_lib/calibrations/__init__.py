@@ -1,0 +1,1 @@
+"""Declared calibrations: the only code besides the scorecard that may read a published value."""

@@ -1,0 +1,1 @@
+"""Filters and learned estimators of the four papers."""

@@ -1,0 +1,1 @@
+"""The four arms: parameters, kinematics, limits, actuator maps and simulated plants."""
