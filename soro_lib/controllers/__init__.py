@@ -1,1 +1,13 @@
 """The control laws of the four papers."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submod_attrs={
+        "gesture_steering": ["GestureSteering"],
+        "shared_control": ["AssistAsNeeded", "FixedAssistance", "GoalSelection"],
+        "hybrid": ["HybridController"],
+        "virtual_stiffness": ["VirtualStiffnessController", "limit_state"],
+    },
+)

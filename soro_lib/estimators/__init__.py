@@ -1,1 +1,13 @@
 """Filters and learned estimators of the four papers."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submod_attrs={
+        "palm_filter": ["PalmFilter"],
+        "extreme_learning_machine": ["ExtremeLearningMachine"],
+        "pose_fusion": ["fuse_poses"],
+        "shape_estimation": ["estimate_shape"],
+    },
+)

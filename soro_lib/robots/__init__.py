@@ -1,1 +1,13 @@
 """The four arms: parameters, kinematics, limits, actuator maps and simulated plants."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submod_attrs={
+        "cable_driven": ["CableDrivenArm"],
+        "helix": ["HelixArm"],
+        "pneumatic": ["PneumaticArm"],
+        "soft_growing": ["SoftGrowingArm"],
+    },
+)

@@ -1,1 +1,11 @@
 """What the robots and their operators are seen and felt with: hand tracking, fibre gratings, cameras."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submod_attrs={
+        "hand_tracking": ["load_hand_recording"],
+        "stereo_vision": ["triangulate"],
+    },
+)
