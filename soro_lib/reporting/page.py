@@ -1,0 +1,99 @@
+"""The page a notebook writes: every figure and table is saved under the paper's name for it, and shown."""
+
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import pandas as pd
+from IPython.display import HTML, Image, display
+from matplotlib.figure import Figure
+
+from soro_lib.project import output_directory
+from soro_lib.reporting import markup, policy
+from soro_lib.reporting.card import load_card
+from soro_lib.reporting.equations import load_equations, load_errata
+from soro_lib.reporting.scorecard import build_scorecard
+from soro_lib.studies.findings import Finding
+
+
+class Page:
+    """The page of one paper.
+
+    Parameters
+    ----------
+    slug
+        The paper, as in ``data/<slug>`` and ``figures/<slug>``.
+    directory
+        Where figures and tables are written; by default `soro_lib.project.output_directory`.
+
+    Examples
+    --------
+    A notebook begins with ``page = Page("gesture_steering"); page.card()`` and ends with
+    ``page.equations(); page.scorecard(findings); page.errata()``.
+    """
+
+    def __init__(self, slug: str, directory: Path | None = None) -> None:
+        self.slug = slug
+        self.directory = output_directory(slug) if directory is None else directory
+
+    def card(self) -> None:
+        """Show the replication card."""
+        display(HTML(markup.card_html(load_card(self.slug))))
+
+    def figure(self, figure: Figure, name: str) -> None:
+        """Save a figure as ``<name>.png`` and show it; the same figure gives the same bytes.
+
+        Raises
+        ------
+        ValueError
+            If `name` has other characters than lower-case letters, digits and underscores.
+        """
+        path = self._path(name, "png")
+        partial = path.with_suffix(".png.partial")
+        figure.savefig(partial, format="png", dpi=policy.DPI, metadata={"Software": None})
+        os.replace(partial, path)
+        width, _ = figure.get_size_inches()
+        display(Image(filename=str(path), width=round(110 * width)))
+
+    def table(self, table: pd.DataFrame, name: str) -> None:
+        """Save a table as ``<name>.csv`` without its index, six significant digits, and show it.
+
+        Raises
+        ------
+        ValueError
+            As `figure`.
+        """
+        self._write(table, name)
+        display(HTML(markup.frame_html(table)))
+
+    def equations(self) -> None:
+        """Show which function is which equation, and which test holds it."""
+        display(HTML(markup.frame_html(load_equations(self.slug), code=("function", "test"))))
+
+    def errata(self) -> None:
+        """Show what the paper prints wrongly, what is right, and why."""
+        display(HTML(markup.frame_html(load_errata(self.slug), code=("test",))))
+
+    def scorecard(self, findings: Mapping[str, Finding]) -> None:
+        """Judge the findings, save ``scorecard.csv`` and show it.
+
+        Raises
+        ------
+        TableError, ValueError
+            As `build_scorecard`.
+        """
+        scorecard = build_scorecard(self.slug, findings)
+        self._write(scorecard, "scorecard")
+        display(HTML(markup.scorecard_html(scorecard)))
+
+    def _write(self, table: pd.DataFrame, name: str) -> None:
+        path = self._path(name, "csv")
+        partial = path.with_suffix(".csv.partial")
+        table.to_csv(partial, index=False, float_format=policy.FLOAT_FORMAT, lineterminator="\n")
+        os.replace(partial, path)
+
+    def _path(self, name: str, suffix: str) -> Path:
+        if not re.fullmatch(r"[a-z0-9_]+", name):
+            raise ValueError(f"name {name!r}: only lower-case letters, digits and underscores")
+        return self.directory / f"{name}.{suffix}"

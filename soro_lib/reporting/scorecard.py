@@ -1,0 +1,169 @@
+"""Published number, our number, interval over seeds, verdict: the heart of every notebook."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from scipy.stats import bootstrap
+
+from soro_lib.reporting import policy
+from soro_lib.reporting.published import PublishedNumber, load_published
+from soro_lib.reporting.tabular import suggestion
+from soro_lib.studies.findings import STATISTICS, Finding
+
+COLUMNS = [
+    *("id", "location", "quantity", "unit", "kind", "role"),
+    *("published", "ours", "low", "high", "seeds", "tolerance", "verdict", "reason"),
+]
+"""The header of ``scorecard.csv``."""
+
+VERDICTS = ("reproduced", "close", "differs", "calibrated", "not attempted")
+"""Every verdict, best first."""
+
+
+def verdict(role: str, published: float, ours: float | None, tolerance: float) -> str:
+    """Judge one number by the rules that were fixed before the run.
+
+    Parameters
+    ----------
+    role
+        ``prediction`` or ``calibration``.
+    published, ours, tolerance
+        In the same unit; `ours` is None where the number was not attempted.
+
+    Returns
+    -------
+    str
+        ``reproduced`` within the tolerance, ``close`` within twice the tolerance, ``differs`` beyond. A
+        number that the plant was fitted to is at best ``calibrated`` (within twice the tolerance), never
+        reproduced.
+    """
+    if ours is None:
+        return "not attempted"
+    if not policy.within(ours, published, policy.CLOSE_FACTOR * tolerance):
+        return "differs"
+    if role == "calibration":
+        return "calibrated"
+    return "reproduced" if policy.within(ours, published, tolerance) else "close"
+
+
+def confidence_interval(finding: Finding) -> tuple[float, float]:
+    """Return the 95 % percentile-bootstrap interval over seeds, (NaN, NaN) for a single sample.
+
+    The resampling has a generator of its own (`policy.BOOTSTRAP_SEED`): the same samples give the same
+    interval.
+    """
+    if finding.seeds == 1:
+        return math.nan, math.nan
+    result = bootstrap(
+        (np.asarray(finding.samples),),
+        STATISTICS[finding.statistic],
+        n_resamples=policy.BOOTSTRAP_RESAMPLES,
+        confidence_level=policy.CONFIDENCE,
+        method="percentile",
+        rng=np.random.default_rng(policy.BOOTSTRAP_SEED),
+    )
+    return float(result.confidence_interval.low), float(result.confidence_interval.high)
+
+
+def build_scorecard(slug: str, findings: Mapping[str, Finding]) -> pd.DataFrame:
+    """Set the findings of a study beside the published numbers of its paper.
+
+    Parameters
+    ----------
+    slug
+        The paper.
+    findings
+        Findings by the id of the published row. Rows without one are ``not attempted``, with their note as
+        reason.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per published number, `COLUMNS`, in the order of ``published.csv``.
+
+    Raises
+    ------
+    TableError
+        If ``published.csv`` is wrong.
+    ValueError
+        If a finding has an unknown id, belongs to a hardware row, or is not finite.
+    """
+    numbers = load_published(slug)
+    _check(slug, numbers, findings)
+    rows = [_judge(number, findings.get(number.id)) for number in numbers.values()]
+    return pd.DataFrame(rows, columns=COLUMNS).astype({"seeds": "Int64"})
+
+
+def _check(slug: str, numbers: Mapping[str, PublishedNumber], findings: Mapping[str, Finding]) -> None:
+    source = f"data/{slug}/published.csv"
+    problems = [
+        f"finding {name!r} has no row in {source}{suggestion(name, numbers)}"
+        for name in findings
+        if name not in numbers
+    ]
+    for name, finding in findings.items():
+        number = numbers.get(name)
+        if number is None:
+            continue
+        if not np.all(np.isfinite(finding.samples)) or not math.isfinite(finding.value):
+            problems.append(
+                f"finding {name!r}: {finding.statistic} of {finding.seeds} samples is {finding.value}; "
+                "every sample and the statistic must be finite"
+            )
+        if number.kind == "hardware":
+            problems.append(
+                f"finding {name!r}: its row in {source} is of kind hardware, which no simulation can give"
+            )
+        if number.kind == "ordering" and not 0.0 <= finding.value <= 1.0:
+            problems.append(
+                f"finding {name!r}: {finding.value} is no probability, an ordering row needs 0..1"
+            )
+    if problems:
+        raise ValueError("\n".join(problems))
+
+
+def _judge(number: PublishedNumber, finding: Finding | None) -> dict[str, object]:
+    """Return one row of the scorecard."""
+    ours = None if finding is None else finding.value
+    low, high = (math.nan, math.nan) if finding is None else confidence_interval(finding)
+    return {
+        "id": number.id,
+        "location": number.location,
+        "quantity": number.quantity,
+        "unit": number.unit,
+        "kind": number.kind,
+        "role": number.role,
+        "published": number.value,
+        "ours": math.nan if ours is None else ours,
+        "low": low,
+        "high": high,
+        "seeds": pd.NA if finding is None else finding.seeds,
+        "tolerance": number.tolerance,
+        "verdict": verdict(number.role, number.value, ours, number.tolerance),
+        "reason": (finding.reason if finding else "") or number.note,
+    }
+
+
+def verdict_counts(scorecards: Mapping[str, pd.DataFrame], by: str | None = None) -> pd.DataFrame:
+    """Count verdicts per paper.
+
+    Parameters
+    ----------
+    scorecards
+        Scorecards by slug.
+    by
+        None counts all rows of a paper together; a column name (``kind``, ``role``) splits them.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Index ``paper`` (and `by`), one column per verdict and ``rows``, the total [count].
+    """
+    merged = pd.concat([card.assign(paper=slug) for slug, card in scorecards.items()], ignore_index=True)
+    index = ["paper"] if by is None else ["paper", by]
+    counts = merged.groupby([*index, "verdict"], sort=False).size().unstack(fill_value=0)
+    counts = counts.reindex(columns=list(VERDICTS), fill_value=0)
+    counts.columns.name = None
+    return counts.assign(rows=counts.sum(axis=1))
