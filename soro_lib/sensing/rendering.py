@@ -1,0 +1,597 @@
+"""A pinhole camera and what it sees: textured quads, flat polygons and shaded spheres, drawn far to near.
+
+The images are made for real detectors (ORB features, ArUco markers, colour contours), so geometry is exact
+to a fraction of a pixel and the photometry has the noise of a sensor. Nothing here knows a robot.
+
+Frames: the camera frame is OpenCV's, x right, y down, z forward. A pose is a (4, 4) homogeneous matrix named
+``camera_in_world``: it takes points of the camera frame to the world. Pixel (0, 0) is the centre of the
+upper left pixel.
+
+    camera = Camera(640, 480, focal_length=520.0)
+    image = render(camera, camera_in_world, [TexturedQuad(corners, texture), Sphere(centre, 0.02, 200)])
+    image = expose(image, Photometry(gain=0.5), rng.standard_normal(image.shape, dtype=np.float32))
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+NEAR = 1e-3
+"""Distance of the near plane [m]: whatever is closer to the camera, or behind it, is cut off."""
+
+Image = NDArray[np.uint8]
+Region = tuple[slice, slice]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera with optional radial and tangential distortion.
+
+    Parameters
+    ----------
+    width, height : int
+        Size of the image [px].
+    focal_length : float
+        Focal length [px], the same along both axes.
+    principal_point : (float, float), optional
+        Where the optical axis meets the image [px]; the middle of the image by default.
+    distortion : tuple of float, optional
+        OpenCV's coefficients (k1, k2, p1, p2[, k3]); empty for none.
+
+    Raises
+    ------
+    ValueError
+        If a size or the focal length is not positive, or the distortion has a length OpenCV does not know.
+    """
+
+    width: int
+    height: int
+    focal_length: float
+    principal_point: tuple[float, float] | None = None
+    distortion: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height", "focal_length"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"Camera.{name} must be positive, got {getattr(self, name)}")
+        if len(self.distortion) not in (0, 4, 5):
+            raise ValueError(f"Camera.distortion must have 0, 4 or 5 entries, got {len(self.distortion)}")
+
+    @cached_property
+    def matrix(self) -> NDArray[np.float64]:
+        """Return the (3, 3) matrix of intrinsic parameters."""
+        centre = self.principal_point or ((self.width - 1) / 2, (self.height - 1) / 2)
+        return np.array([[self.focal_length, 0, centre[0]], [0, self.focal_length, centre[1]], [0, 0, 1.0]])
+
+    @cached_property
+    def coefficients(self) -> NDArray[np.float64]:
+        """Return the distortion coefficients as OpenCV wants them, (n,)."""
+        return np.array(self.distortion or (0.0, 0.0, 0.0, 0.0))
+
+    def project(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Return the pixels (n, 2) of points (n, 3) [m] in the camera frame, in front of it."""
+        points = np.asarray(points, dtype=float).reshape(-1, 3)
+        if self.distortion:
+            origin = np.zeros(3)
+            pixels, _ = cv2.projectPoints(points, origin, origin, self.matrix, self.coefficients)
+            return np.array(pixels, dtype=float).reshape(-1, 2)
+        homogeneous = points @ self.matrix.T
+        return homogeneous[:, :2] / homogeneous[:, 2:]
+
+    def rays(self, pixels: ArrayLike) -> NDArray[np.float64]:
+        """Return the viewing directions (n, 3), with z = 1 and the distortion removed, of pixels (n, 2)."""
+        pixels = np.asarray(pixels, dtype=float).reshape(-1, 2)
+        if self.distortion:
+            flat = cv2.undistortPoints(pixels[:, None], self.matrix, self.coefficients)[:, 0]
+        else:
+            flat = (pixels - self.matrix[:2, 2]) / self.focal_length
+        return np.column_stack([flat, np.ones(len(flat))])
+
+    @cached_property
+    def reach(self) -> float:
+        """Return the distance r / z from the optical axis up to which the radial distortion is monotonic.
+
+        Beyond it the polynomial folds back and would show things that lie outside the field of view.
+        """
+        k1, k2, _, _, k3 = (*self.distortion, 0.0, 0.0, 0.0, 0.0, 0.0)[:5]
+        roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
+        turns = roots.real[(abs(roots.imag) < 1e-12) & (roots.real > 0)]
+        return float(np.sqrt(turns.min(initial=np.inf)))
+
+    def clip(self, polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the part (m, 3) of a convex polygon (n, 3) in front of the camera and near its view.
+
+        The view is widened by a whole image on every side, which leaves room for the distortion.
+        """
+        (f, _, cx), (_, _, cy) = self.matrix[:2]
+        left, top = cx + self.width, cy + self.height
+        right, bottom = 2 * self.width - cx, 2 * self.height - cy
+        polygon = clip_half_space(polygon, (0, 0, 1), NEAR)
+        for normal in ((f, 0, left), (-f, 0, right), (0, f, top), (0, -f, bottom)):
+            polygon = clip_half_space(polygon, normal, 0.0)
+        return polygon
+
+    def sees(self, points: NDArray[np.float64]) -> bool:
+        """Return whether all points (n, 3) in the camera frame lie in front and within :attr:`reach`."""
+        distance = np.hypot(points[:, 0], points[:, 1])
+        return bool((points[:, 2] >= NEAR).all() and (distance <= self.reach * points[:, 2]).all())
+
+
+class Drawable(Protocol):
+    """What :func:`render` can draw: it has a layer and a middle to sort by, and paints itself."""
+
+    @property
+    def layer(self) -> int:
+        """Return the layer; a lower one is drawn first, whatever the distance (floors, backgrounds)."""
+
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """Return the point (3,) [m] in the world whose distance from the camera sets the painting order."""
+
+    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
+        """Paint into ``image``, in place."""
+
+
+@dataclass(frozen=True, eq=False)
+class TexturedQuad:
+    """A flat parallelogram with a picture on its front; from behind it cannot be seen.
+
+    Parameters
+    ----------
+    corners : array (4, 3)
+        Corners [m] in the world: upper left, upper right, lower right, lower left of the picture.
+    texture : array (h, w) or (h, w, 3)
+        The picture, uint8. It covers the quad exactly, so its scale is the quad's.
+    layer : int, optional
+        Painting layer, see :class:`Drawable`.
+    supersampling : int, optional
+        Samples per pixel along each axis. 1 is fast and has hard edges; 3 gives the soft, unbiased edges that
+        subpixel corner detection (ArUco) needs.
+
+    Raises
+    ------
+    ValueError
+        If the corners are not finite, not (4, 3) or not a parallelogram, or the texture is not uint8.
+
+    Notes
+    -----
+    With a distorting camera the corners are placed exactly and the inside by the homography through them:
+    good for small quads. Cut large ones into pieces with :meth:`split`; a piece that reaches beyond
+    :attr:`Camera.reach` is left out.
+    """
+
+    corners: NDArray[np.float64]
+    texture: Image
+    layer: int = 0
+    supersampling: int = 1
+
+    def __post_init__(self) -> None:
+        corners = np.asarray(self.corners, dtype=float)
+        if corners.shape != (4, 3) or not np.isfinite(corners).all():
+            raise ValueError(
+                f"TexturedQuad.corners must be four finite points (4, 3), got shape {corners.shape}"
+            )
+        if not np.allclose(corners[0] + corners[2], corners[1] + corners[3], atol=1e-6):
+            raise ValueError("TexturedQuad.corners must form a parallelogram")
+        if self.texture.dtype != np.uint8 or self.texture.ndim not in (2, 3):
+            raise ValueError(f"TexturedQuad.texture must be a uint8 picture, got {self.texture.dtype}")
+        object.__setattr__(self, "corners", corners)
+
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """Return the centre of the quad (3,) [m]."""
+        return self.corners.mean(axis=0)
+
+    def split(self, rows: int, columns: int) -> list["TexturedQuad"]:
+        """Return the quad cut into ``rows`` x ``columns`` quads along whole pixels of its texture."""
+        height, width = self.texture.shape[:2]
+        vertical = np.linspace(0, height, rows + 1).astype(int)
+        horizontal = np.linspace(0, width, columns + 1).astype(int)
+        origin, right, down = self.corners[0], *self._edges(self.corners)
+        pieces = []
+        for top, bottom in pairwise(vertical):
+            for left, end in pairwise(horizontal):
+                ends = [(left, top), (end, top), (end, bottom), (left, bottom)]
+                corners = np.array([origin + x / width * right + y / height * down for x, y in ends])
+                texture = self.texture[top:bottom, left:end]
+                pieces.append(TexturedQuad(corners, texture, self.layer, self.supersampling))
+        return pieces
+
+    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
+        """Paint the quad into ``image``, in place."""
+        corners = transform_points(world_in_camera, self.corners)
+        right, down = self._edges(corners)
+        if np.cross(right, down) @ corners[0] <= 0:
+            return
+        outline = camera.clip(corners)
+        if len(outline) < 3 or (camera.distortion and not camera.sees(corners)):
+            return
+        pixels = camera.project(outline)
+        region = _region(pixels, image)
+        if region is None:
+            return
+        height, width = self.texture.shape[:2]
+        if camera.distortion:
+            edges = np.array([(0, 0), (width, 0), (width, height), (0, height)]) - 0.5
+            corners_seen = camera.project(corners).astype(np.float32)
+            homography = cv2.getPerspectiveTransform(edges.astype(np.float32), corners_seen).astype(float)
+        else:
+            per_texel = np.array([[1 / width, 0, 0.5 / width], [0, 1 / height, 0.5 / height], [0, 0, 1]])
+            homography = camera.matrix @ np.column_stack([right, down, corners[0]]) @ per_texel
+        homography, size = _into_region(homography, region, self.supersampling)
+        patch = _image(cv2.warpPerspective(self.texture, homography, size, borderMode=cv2.BORDER_REPLICATE))
+        inside = np.full((height, width), 255, dtype=np.uint8)
+        mask = _image(cv2.warpPerspective(inside, homography, size, flags=cv2.INTER_NEAREST))
+        if outline is not corners:
+            mask &= _polygon_mask(pixels, region, self.supersampling)
+        _paste(image, region, patch, mask)
+
+    @staticmethod
+    def _edges(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return corners[1] - corners[0], corners[3] - corners[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon:
+    """A flat convex polygon of one colour, seen from both sides.
+
+    Parameters
+    ----------
+    corners : array (n, 3)
+        Corners [m] in the world, in order around the polygon.
+    color : int or (int, int, int)
+        Grey level, or blue, green, red, 0 to 255.
+    layer : int, optional
+        Painting layer, see :class:`Drawable`.
+    """
+
+    corners: NDArray[np.float64]
+    color: int | tuple[int, int, int]
+    layer: int = 0
+
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """Return the mean of the corners (3,) [m]."""
+        return np.mean(self.corners, axis=0)
+
+    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
+        """Paint the polygon into ``image``, in place, with softened edges."""
+        outline = camera.clip(transform_points(world_in_camera, self.corners))
+        if len(outline) < 3 or (camera.distortion and not camera.sees(outline)):
+            return
+        pixels = camera.project(outline)
+        if _region(pixels, image) is not None:
+            cv2.fillConvexPoly(image, _fixed_point(pixels), self.color, cv2.LINE_AA, shift=4)
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    """A matt ball under one distant lamp; its outline and shading are exact for every pixel.
+
+    Parameters
+    ----------
+    centre : array (3,)
+        Centre [m] in the world.
+    radius : float
+        Radius [m].
+    color : int or (int, int, int)
+        Grey level, or blue, green, red of the fully lit surface, 0 to 255.
+    to_light : array (3,), optional
+        Direction in the world from the ball to the lamp.
+    ambient : float, optional
+        Brightness of the unlit side as a part of the lit one, 0 to 1.
+    layer, supersampling : int, optional
+        As for :class:`TexturedQuad`.
+    """
+
+    centre: NDArray[np.float64]
+    radius: float
+    color: int | tuple[int, int, int]
+    to_light: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    ambient: float = 1.0
+    layer: int = 0
+    supersampling: int = 3
+
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """Return the centre (3,) [m]."""
+        return np.asarray(self.centre, dtype=float)
+
+    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
+        """Paint the ball into ``image``, in place."""
+        centre = transform_points(world_in_camera, self.middle[None])[0]
+        silhouette = self._silhouette(centre)
+        if centre[2] < NEAR + self.radius or not camera.sees(silhouette):
+            return
+        region = _region(camera.project(silhouette), image)
+        if region is None:
+            return
+        rays = camera.rays(_pixel_grid(region, self.supersampling))
+        rays /= np.sqrt((rays**2).sum(axis=1))[:, None]
+        along = rays @ centre
+        discriminant = along**2 - (centre @ centre - self.radius**2)
+        hit = discriminant >= 0
+        normals = (rays * (along - np.sqrt(np.where(hit, discriminant, 0)))[:, None] - centre) / self.radius
+        light = world_in_camera[:3, :3] @ np.asarray(self.to_light, dtype=float)
+        lit = np.maximum(normals @ (light / np.linalg.norm(light)), 0)
+        brightness = self.ambient + (1 - self.ambient) * lit
+        rows, columns = (self.supersampling * (axis.stop - axis.start) for axis in region)
+        patch = np.clip(brightness[:, None] * np.atleast_1d(self.color), 0, 255).astype(np.uint8)
+        mask = np.where(hit, 255, 0).astype(np.uint8).reshape(rows, columns)
+        _paste(image, region, patch.reshape(rows, columns, *image.shape[2:]), mask)
+
+    def _silhouette(self, centre: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return points (32, 3) of the circle in which the cone of tangents touches the ball."""
+        shrink = 1 - self.radius**2 / (centre @ centre)
+        _, _, axes = np.linalg.svd(centre[None])
+        angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+        circle = np.outer(np.cos(angles), axes[1]) + np.outer(np.sin(angles), axes[2])
+        return shrink * centre + np.sqrt(shrink) * self.radius * circle
+
+
+def render(
+    camera: Camera,
+    camera_in_world: ArrayLike,
+    scene: Sequence[Drawable],
+    background: int | tuple[int, int, int] | Image = 0,
+) -> Image:
+    """Return the picture the camera takes of the scene, without noise: the painter's algorithm.
+
+    Parameters
+    ----------
+    camera : Camera
+        Intrinsic parameters.
+    camera_in_world : array (4, 4)
+        Pose of the camera.
+    scene : sequence of Drawable
+        What is there; drawn layer by layer, in each layer from the farthest middle to the nearest.
+    background : int, (int, int, int) or image, optional
+        Colour (grey, or blue, green, red) or picture behind everything; it decides whether the image is grey.
+
+    Returns
+    -------
+    array (height, width) or (height, width, 3), uint8
+
+    Raises
+    ------
+    ValueError
+        If the pose is not a finite (4, 4) matrix or the background picture has another size than the image.
+    """
+    camera_in_world = np.asarray(camera_in_world, dtype=float)
+    if camera_in_world.shape != (4, 4) or not np.isfinite(camera_in_world).all():
+        raise ValueError(f"camera_in_world must be a finite (4, 4) matrix, got shape {camera_in_world.shape}")
+    if isinstance(background, np.ndarray):
+        if background.shape[:2] != (camera.height, camera.width):
+            raise ValueError(
+                f"background must be {camera.height} x {camera.width}, got {background.shape[:2]}"
+            )
+        image = background.copy()
+    else:
+        channels = () if isinstance(background, int) else (3,)
+        image = np.full((camera.height, camera.width, *channels), background, dtype=np.uint8)
+    position = camera_in_world[:3, 3]
+    world_in_camera = invert_pose(camera_in_world)
+    for item in sorted(scene, key=lambda item: (item.layer, -np.linalg.norm(item.middle - position))):
+        item.draw(image, camera, world_in_camera)
+    return image
+
+
+@dataclass(frozen=True)
+class Photometry:
+    """How light becomes grey levels: a sensor with shot and read noise behind a lens.
+
+    Parameters
+    ----------
+    gain : float, optional
+        Light and exposure together: factor on the noise-free grey levels, 0 is darkness.
+    read_noise : float, optional
+        Standard deviation of the signal-independent noise [grey levels].
+    shot_noise : float, optional
+        Variance of the noise per grey level of signal [grey levels].
+    blur : float, optional
+        Standard deviation of the lens blur [px].
+    motion : (float, float), optional
+        How far the image moves during the exposure, to the right and down [px].
+
+    Raises
+    ------
+    ValueError
+        If a parameter is negative or not finite.
+    """
+
+    gain: float = 1.0
+    read_noise: float = 3.0
+    shot_noise: float = 0.15
+    blur: float = 0.0
+    motion: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("gain", "read_noise", "shot_noise", "blur"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise ValueError(
+                    f"Photometry.{name} must be finite and not negative, got {getattr(self, name)}"
+                )
+        if not np.isfinite(self.motion).all():
+            raise ValueError(f"Photometry.motion must be finite, got {self.motion}")
+
+
+def expose(image: Image, photometry: Photometry, noise: NDArray[np.float32]) -> Image:
+    """Return the image as the sensor delivers it: blurred, scaled, noisy, clipped to 0 ... 255.
+
+    Parameters
+    ----------
+    image : array (h, w) or (h, w, 3), uint8
+        Noise-free image.
+    photometry : Photometry
+        Gain, noise and blur. The variance of a pixel is ``read_noise**2 + shot_noise * signal``.
+    noise : array of the image's shape, float32
+        Standard normal numbers: ``rng.standard_normal(image.shape, dtype=np.float32)``, or from a
+        :class:`NoiseBank` where drawing that many takes too long.
+
+    Returns
+    -------
+    array of the image's shape, uint8
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ.
+    """
+    if noise.shape != image.shape:
+        raise ValueError(f"noise must have the image's shape {image.shape}, got {noise.shape}")
+    if photometry.blur > 0:
+        image = _image(cv2.GaussianBlur(image, (0, 0), photometry.blur))
+    if max(map(abs, photometry.motion)) >= 1:
+        image = _image(cv2.filter2D(image, -1, motion_kernel(*photometry.motion)))
+    levels = np.arange(256, dtype=np.float32) * np.float32(photometry.gain)
+    spread = np.sqrt(photometry.read_noise**2 + photometry.shot_noise * levels, dtype=np.float32)
+    signal = np.maximum(levels[image] + spread[image] * noise, 0)
+    return _image(cv2.convertScaleAbs(signal))
+
+
+def motion_kernel(right: float, down: float) -> NDArray[np.float32]:
+    """Return the normalised kernel of a straight camera movement by (right, down) [px] in one exposure."""
+    size = 2 * int(np.ceil(max(abs(right), abs(down)) / 2)) + 1
+    kernel = np.zeros((size, size), dtype=np.float32)
+    half = np.array([right, down]) / 2
+    ends = _fixed_point(np.array([size // 2 - half, size // 2 + half]))
+    cv2.line(kernel, ends[0], ends[1], 1.0, 1, cv2.LINE_8, shift=4)
+    return kernel / kernel.sum()
+
+
+class NoiseBank:
+    """Sensor noise for long films: a few noise pictures made once, shifted at random for every frame.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Shape of the images.
+    rng : numpy.random.Generator
+        Source of the pictures.
+    count : int, optional
+        Number of pictures.
+    """
+
+    def __init__(self, shape: tuple[int, ...], rng: np.random.Generator, count: int = 6) -> None:
+        self._pictures = rng.standard_normal((count, *shape), dtype=np.float32)
+
+    def draw(self, rng: np.random.Generator) -> NDArray[np.float32]:
+        """Return standard normal noise of the bank's shape, float32."""
+        picture = self._pictures[rng.integers(len(self._pictures))]
+        rows, columns = (int(rng.integers(size)) for size in picture.shape[:2])
+        return np.roll(picture, (rows, columns), axis=(0, 1))
+
+
+def transform_points(transform: NDArray[np.float64], points: ArrayLike) -> NDArray[np.float64]:
+    """Return points (n, 3) taken through a (4, 4) homogeneous matrix."""
+    return np.asarray(points, dtype=float) @ transform[:3, :3].T + transform[:3, 3]
+
+
+def invert_pose(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the inverse of a rigid (4, 4) homogeneous matrix."""
+    inverse = np.eye(4)
+    inverse[:3, :3] = pose[:3, :3].T
+    inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
+    return inverse
+
+
+def look_at(position: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> NDArray[np.float64]:
+    """Return ``camera_in_world`` (4, 4) of an upright camera at ``position`` aimed at ``target`` [m]."""
+    position = np.asarray(position, dtype=float)
+    forward = np.asarray(target, dtype=float) - position
+    right = np.cross(forward, np.asarray(up, dtype=float))
+    if not np.linalg.norm(right) > 1e-9:
+        raise ValueError("look_at: target must differ from position, in a direction other than up")
+    axes = np.array([right, np.cross(forward, right), forward])
+    pose = np.eye(4)
+    pose[:3, :3] = (axes / np.linalg.norm(axes, axis=1, keepdims=True)).T
+    pose[:3, 3] = position
+    return pose
+
+
+def clip_half_space(polygon: NDArray[np.float64], normal: ArrayLike, offset: float) -> NDArray[np.float64]:
+    """Return the part (m, 3) of a convex polygon (n, 3) where ``points @ normal >= offset``."""
+    beyond = polygon @ np.asarray(normal, dtype=float) - offset
+    if (beyond >= 0).all():
+        return polygon
+    kept = []
+    for here, there, start, end in zip(beyond, np.roll(beyond, -1), polygon, np.roll(polygon, -1, axis=0)):
+        if here >= 0:
+            kept.append(start)
+        if (here >= 0) != (there >= 0):
+            kept.append(start + here / (here - there) * (end - start))
+    return np.array(kept).reshape(-1, 3)
+
+
+def _image(picture: object) -> Image:
+    """Return what an OpenCV function made as the 8-bit image it is (OpenCV's own types are wider)."""
+    return np.asarray(picture, dtype=np.uint8)
+
+
+def _region(pixels: NDArray[np.float64], image: Image) -> Region | None:
+    """Return the rows and columns of the image that the pixels (n, 2) span, or None if they miss it."""
+    size = np.array(image.shape[1::-1])
+    low = np.clip(np.floor(pixels.min(axis=0)), 0, size).astype(int)
+    high = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, size).astype(int)
+    if (high <= low).any():
+        return None
+    return slice(low[1], high[1]), slice(low[0], high[0])
+
+
+def _into_region(
+    homography: NDArray[np.float64], region: Region, supersampling: int
+) -> tuple[NDArray[np.float64], tuple[int, int]]:
+    """Return the homography into the supersampled region, and the region's size (width, height) there."""
+    rows, columns = region
+    centre = 0.5 * (supersampling - 1)
+    shift = np.array(
+        [
+            [supersampling, 0, centre - supersampling * columns.start],
+            [0, supersampling, centre - supersampling * rows.start],
+            [0, 0, 1],
+        ]
+    )
+    size = supersampling * (columns.stop - columns.start), supersampling * (rows.stop - rows.start)
+    return shift @ homography, size
+
+
+def _pixel_grid(region: Region, supersampling: int) -> NDArray[np.float64]:
+    """Return the image coordinates (n, 2) of all samples of the region, row by row."""
+    y, x = (
+        (np.arange(supersampling * axis.start, supersampling * axis.stop) + 0.5) / supersampling - 0.5
+        for axis in region
+    )
+    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+
+def _polygon_mask(pixels: NDArray[np.float64], region: Region, supersampling: int) -> Image:
+    """Return a mask of the supersampled region, 255 inside the convex polygon of pixels (n, 2)."""
+    shift, (width, height) = _into_region(np.eye(3), region, supersampling)
+    inside = np.clip(pixels * shift[0, 0] + shift[:2, 2], -1e6, 1e6)
+    mask = np.zeros((height, width), dtype=np.uint8)
+    cv2.fillConvexPoly(mask, _fixed_point(inside), 255, shift=4)
+    return mask
+
+
+def _fixed_point(pixels: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Return pixel coordinates with four fractional bits, for OpenCV's drawing functions."""
+    return np.round(np.clip(pixels, -1e6, 1e6) * 16).astype(np.int32)
+
+
+def _paste(image: Image, region: Region, patch: Image, mask: Image) -> None:
+    """Put the supersampled patch into the region of the image where the mask says so, softly at its edges."""
+    target = image[region]
+    if mask.shape == target.shape[:2]:
+        cv2.copyTo(patch, mask, target)
+        return
+    size = target.shape[1::-1]
+    patch = _image(cv2.resize(patch, size, interpolation=cv2.INTER_AREA))
+    weight = cv2.resize(mask, size, interpolation=cv2.INTER_AREA).astype(np.float32) / 255
+    weight = weight.reshape(weight.shape + (1,) * (target.ndim - 2))
+    target[...] = np.round(weight * patch + (1 - weight) * target)
