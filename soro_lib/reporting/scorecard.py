@@ -126,7 +126,8 @@ def _check(slug: str, numbers: Mapping[str, PublishedNumber], findings: Mapping[
 
 def _judge(number: PublishedNumber, finding: Finding | None) -> dict[str, object]:
     """Return one row of the scorecard."""
-    ours = None if finding is None else finding.value
+    # The verdict is that of the number as written, so that it follows from the table a reader sees.
+    ours = None if finding is None else float(policy.FLOAT_FORMAT % finding.value)
     low, high = (math.nan, math.nan) if finding is None else confidence_interval(finding)
     return {
         "id": number.id,
@@ -146,24 +147,21 @@ def _judge(number: PublishedNumber, finding: Finding | None) -> dict[str, object
     }
 
 
-def verdict_counts(scorecards: Mapping[str, pd.DataFrame], by: str | None = None) -> pd.DataFrame:
-    """Count verdicts per paper.
-
-    Parameters
-    ----------
-    scorecards
-        Scorecards by slug.
-    by
-        None counts all rows of a paper together; a column name (``kind``, ``role``) splits them.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Index ``paper`` (and `by`), one column per verdict and ``rows``, the total [count].
-    """
-    merged = pd.concat([card.assign(paper=slug) for slug, card in scorecards.items()], ignore_index=True)
-    index = ["paper"] if by is None else ["paper", by]
-    counts = merged.groupby([*index, "verdict"], sort=False).size().unstack(fill_value=0)
-    counts = counts.reindex(columns=list(VERDICTS), fill_value=0)
-    counts.columns.name = None
-    return counts.assign(rows=counts.sum(axis=1))
+def stale_verdicts(slug: str, scorecard: pd.DataFrame) -> list[str]:
+    """Return where a written scorecard no longer follows from ``published.csv`` and the verdict rules."""
+    numbers = load_published(slug)
+    problems = [
+        f"row {name!r} of published.csv is missing" for name in numbers if name not in set(scorecard["id"])
+    ]
+    for _, row in scorecard.iterrows():
+        number = numbers.get(row["id"])
+        if number is None:
+            problems.append(f"row {row['id']!r} is not in published.csv")
+            continue
+        ours = None if math.isnan(row["ours"]) else row["ours"]
+        expected = verdict(number.role, number.value, ours, number.tolerance)
+        if row["verdict"] != expected:
+            problems.append(f"row {row['id']!r} says {row['verdict']!r}, the rules say {expected!r}")
+        if row["verdict"] in ("differs", "not attempted") and not row["reason"]:
+            problems.append(f"row {row['id']!r} {row['verdict']} without a reason")
+    return problems

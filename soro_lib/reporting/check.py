@@ -1,0 +1,234 @@
+"""Is what is committed what the last run produced? ``python -m soro_lib.reporting.check`` tells.
+
+Every check returns its problems as texts that say what is wrong, where, and how to mend it.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from io import StringIO
+from pathlib import Path
+
+import pandas as pd
+
+from soro_lib import datacards
+from soro_lib.project import ROOT, SLUGS
+from soro_lib.reporting import policy, summary
+from soro_lib.reporting.equations import index_problems
+from soro_lib.reporting.scorecard import stale_verdicts
+from soro_lib.reporting.tabular import TableError
+
+
+def readme(root: Path = ROOT) -> list[str]:
+    """Return problems of the scorecard in the README: it must be the one of the committed figures."""
+    mend = "run `python -m soro_lib.reporting.check --update-readme`"
+    path = root / "README.md"
+    try:
+        _, block, _ = summary.split_readme(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        return [str(error)]
+    return (
+        [] if block == _readme_block(root) else [f"README.md: its scorecard is not that of figures/; {mend}"]
+    )
+
+
+def update_readme(root: Path = ROOT) -> None:
+    """Write the merged scorecard between the markers of the README.
+
+    Raises
+    ------
+    ValueError
+        If the markers are not there.
+    """
+    path = root / "README.md"
+    before, _, after = summary.split_readme(path.read_text(encoding="utf-8"))
+    path.write_text(before + _readme_block(root) + after, encoding="utf-8")
+
+
+def _readme_block(root: Path) -> str:
+    return summary.readme_block(summary.load_scorecards(root / "figures"))
+
+
+def notebooks(root: Path = ROOT) -> list[str]:
+    """Return notebooks that carry outputs or execution counts."""
+    problems = []
+    for path in sorted((root / "notebooks").glob("*.ipynb")):
+        for number, cell in enumerate(json.loads(path.read_text(encoding="utf-8"))["cells"], start=1):
+            if cell.get("outputs") or cell.get("execution_count") is not None:
+                problems.append(
+                    f"notebooks/{path.name}, cell {number}: carries outputs or an execution count; "
+                    f"run `nbstripout notebooks/{path.name}`"
+                )
+    return problems
+
+
+def figures(root: Path = ROOT) -> list[str]:
+    """Return where ``figures/`` as the last run wrote it differs from what is committed.
+
+    Tables are compared number by number (`policy.same_number`), of images only the names, since another
+    version of the font renderer draws other pixels.
+    """
+    committed = set(_git(root, "ls-tree", "-r", "-z", "--name-only", "HEAD", "figures").split("\0")) - {""}
+    written = {str(path.relative_to(root)) for path in (root / "figures").rglob("*") if path.is_file()}
+    problems = [
+        f"{name}: committed, but the last run did not write it; remove it" for name in committed - written
+    ]
+    problems += [
+        f"{name}: written by the last run, but not committed; add it" for name in written - committed
+    ]
+    for name in sorted(committed & written):
+        if name.endswith(".csv"):
+            before = pd.read_csv(
+                StringIO(_git(root, "show", f"HEAD:{name}")), dtype=str, keep_default_na=False
+            )
+            after = pd.read_csv(root / name, dtype=str, keep_default_na=False)
+            problems += [
+                f"{name}: {what}; look why, then commit it" for what in table_differences(before, after)
+            ]
+    return sorted(problems)
+
+
+def table_differences(before: pd.DataFrame, after: pd.DataFrame) -> list[str]:
+    """Return where two tables of text cells differ by more than the policy allows, one text per column."""
+    if list(before.columns) != list(after.columns):
+        return [f"columns {','.join(before.columns)} became {','.join(after.columns)}"]
+    if len(before) != len(after):
+        return [f"{len(before)} rows became {len(after)}"]
+    problems = []
+    for column in before.columns:
+        changed = [
+            f"line {line}: {old!r} became {new!r}"
+            for line, (old, new) in enumerate(zip(before[column], after[column], strict=True), start=2)
+            if old != new and not _same_cell(old, new)
+        ]
+        if changed:
+            problems.append(f"column {column}, {changed[0]} ({len(changed)} of {len(before)} rows changed)")
+    return problems
+
+
+def _same_cell(old: str, new: str) -> bool:
+    try:
+        return policy.same_number(float(old), float(new))
+    except ValueError:
+        return False
+
+
+def scorecards(root: Path = ROOT) -> list[str]:
+    """Return papers without a scorecard, and verdicts that do not follow from the rules or lack a reason."""
+    cards = summary.load_scorecards(root / "figures")
+    problems = [
+        f"figures/{slug}/scorecard.csv: missing; run `make figures`" for slug in SLUGS if slug not in cards
+    ]
+    for slug, card in cards.items():
+        stale = stale_verdicts(slug, card)
+        problems += [f"figures/{slug}/scorecard.csv: {what}; mend it, run `make figures`" for what in stale]
+    return problems
+
+
+def equations() -> list[str]:
+    """Return equations without a function or test that exists, and errata without a test."""
+    problems = []
+    for slug in SLUGS:
+        try:
+            problems += index_problems(slug)
+        except TableError as error:
+            problems.append(str(error))
+    return problems
+
+
+def data(root: Path = ROOT) -> list[str]:
+    """Return data files that have no card, or are not what their card describes."""
+    by_hand = {"published.csv", "equations.csv", "errata.csv", "card.toml"}
+    files = [
+        path for path in sorted((root / "data").rglob("*")) if path.is_file() and path.name not in by_hand
+    ]
+    problems = []
+    for path in files:
+        try:
+            target = path.with_name(path.name.removesuffix(".card.toml"))
+            if path.name.endswith(".card.toml") and target.is_file():
+                continue
+            datacards.verified(target)
+        except datacards.DataCardError as error:
+            problems.append(str(error).replace(f"{root}/", ""))
+    return problems
+
+
+def lock(root: Path = ROOT) -> list[str]:
+    """Return direct requirements of ``pyproject.toml`` that ``environment.txt`` does not hold, or not by hash."""
+    from packaging.requirements import Requirement
+
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    wanted = project["dependencies"] + project.get("optional-dependencies", {}).get("dev", [])
+    locked: dict[str, list[Requirement]] = {}
+    for entry in (root / "environment.txt").read_text(encoding="utf-8").replace("\\\n", " ").splitlines():
+        text = entry.partition(" --hash=")[0].partition("#")[0].strip()
+        if text and not text.startswith("-"):
+            pin = Requirement(text)
+            locked.setdefault(_canonical(pin.name), []).append(pin)
+            if " --hash=" not in entry:
+                locked[_canonical(pin.name)].clear()
+    problems = []
+    for requirement in map(Requirement, wanted):
+        pins = locked.get(_canonical(requirement.name), [])
+        versions = [next(iter(pin.specifier)).version for pin in pins]
+        if not versions or not all(requirement.specifier.contains(version) for version in versions):
+            found = ", ".join(versions) or "no hashed pin"
+            problems.append(
+                f"environment.txt: {found} for `{requirement}` of pyproject.toml; run `make lock`"
+            )
+    return problems
+
+
+def _canonical(name: str) -> str:
+    from packaging.utils import canonicalize_name
+
+    return canonicalize_name(name)
+
+
+def _git(root: Path, *arguments: str) -> str:
+    """Return what git prints; raises RuntimeError where it fails."""
+    result = subprocess.run(["git", *arguments], cwd=root, capture_output=True, text=True, check=False)
+    if result.returncode:
+        raise RuntimeError(f"git {arguments[0]} failed in {root}: {result.stderr.strip()}")
+    return result.stdout
+
+
+CHECKS: dict[str, Callable[[], list[str]]] = {
+    "README shows the committed scorecard": readme,
+    "notebooks carry no outputs": notebooks,
+    "committed figures are what the run wrote": figures,
+    "verdicts follow from the rules": scorecards,
+    "every equation has a function and a test": equations,
+    "data files are what their cards say": data,
+    "the lock satisfies pyproject.toml": lock,
+}
+"""Every check, by what it holds."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run every check, print what failed, and return the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m soro_lib.reporting.check", description=__doc__)
+    parser.add_argument(
+        "--update-readme", action="store_true", help="first write the merged scorecard into README.md"
+    )
+    if parser.parse_args(arguments).update_readme:
+        update_readme()
+    failed = False
+    for title, check in CHECKS.items():
+        try:
+            problems = check()
+        except (OSError, RuntimeError, ValueError) as error:
+            problems = [str(error)]
+        print(f"{'FAILED' if problems else 'ok    '} {title}")
+        for problem in problems:
+            print("       - " + problem.replace("\n", "\n         "))
+        failed = failed or bool(problems)
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,9 @@
+"""Interactive explorers for JupyterLab; without a browser each shows a static figure instead."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submodules=["arms"],
+    submod_attrs={"frontend": ["is_live"]},
+)
