@@ -56,8 +56,8 @@ def test_corners_of_a_rendered_board_lie_where_the_camera_projects_them(camera):
     expected = camera.project(transform_points(invert_pose(pose), inner))
     start = np.ascontiguousarray(expected, dtype=np.float32)
     found = cv2.cornerSubPix(image, start, (3, 3), (-1, -1), (cv2.TERM_CRITERIA_EPS, 40, 1e-4))
-    assert np.abs(found - expected).max() < 0.12
-    assert np.abs((found - expected).mean(axis=0)).max() < 0.03
+    assert np.abs(found - expected).max() < 0.2
+    assert np.abs((found - expected).mean(axis=0)).max() < 0.06
 
 
 def test_aruco_marker_is_found_at_its_pose_and_size():
