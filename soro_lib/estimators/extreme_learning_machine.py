@@ -1,0 +1,288 @@
+"""An online extreme learning machine: wavelength shifts in, tip pose out (Wang et al., Sec. II-C).
+
+One hidden layer of random radial basis functions, whose output weights are solved once by least squares
+(Eqs. (1)-(9)) and then refreshed sample by sample with exponential forgetting (Eqs. (10)-(17)), which is
+recursive least squares. Three things are added that the paper does not print and that it cannot do without:
+the inputs are scaled, the first solution is regularised, and the covariance is bounded.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.blas import dsymv, dsyr
+
+Array = NDArray[np.float64]
+
+POSE_SIZE = 7
+IDENTITY_QUATERNION = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class UpdateResult:
+    """What one sample taught the network.
+
+    Attributes
+    ----------
+    prior_error : ndarray (7,)
+        Label minus prediction before the sample was learned: the honest prediction error [m, -].
+    posterior_error : ndarray (7,)
+        Label minus prediction after the sample was learned: what remains of the label itself [m, -].
+    accepted : bool
+        False if the sample was refused and nothing was learned.
+    reason : str
+        Why the sample was refused; empty if it was accepted.
+    """
+
+    prior_error: Array
+    posterior_error: Array
+    accepted: bool
+    reason: str = ""
+
+
+def unit_quaternion(quaternion: ArrayLike) -> Array:
+    """Scale quaternions ``(..., 4)`` to unit length; one without a direction becomes the identity."""
+    quaternion = np.asarray(quaternion, dtype=float)
+    norm = np.sqrt(np.einsum("...i,...i->...", quaternion, quaternion))[..., None]
+    usable = np.isfinite(norm) & (norm > 1e-9)
+    return np.where(usable, quaternion / np.where(usable, norm, 1.0), IDENTITY_QUATERNION)
+
+
+def radial_basis(inputs: ArrayLike, centres: ArrayLike, widths: ArrayLike) -> Array:
+    """Response of the hidden nodes, ``exp(-|x - a_i|^2 / b_i)`` (Wang et al., Eq. (3); Erratum VS-5).
+
+    Parameters
+    ----------
+    inputs : array_like (..., l)
+        Scaled wavelength shifts [-].
+    centres : array_like (N, l)
+        Node centres a_i [-].
+    widths : array_like (N,)
+        Node widths b_i > 0 [-].
+
+    Returns
+    -------
+    ndarray (..., N)
+        One row of the hidden-layer output matrix per input.
+    """
+    inputs, centres = np.asarray(inputs, dtype=float), np.asarray(centres, dtype=float)
+    squared = (
+        np.einsum("...l,...l->...", inputs, inputs)[..., None]
+        - 2.0 * inputs @ centres.T
+        + np.einsum("nl,nl->n", centres, centres)
+    )
+    return np.exp(-squared / np.asarray(widths, dtype=float))
+
+
+def same_hemisphere(poses: ArrayLike, reference: ArrayLike) -> Array:
+    """Flip the sign of each pose's quaternion so that it lies on the side of the reference's.
+
+    Parameters
+    ----------
+    poses, reference : array_like (..., 7)
+        Position [m] and scalar-last quaternion; the two shapes broadcast.
+
+    Returns
+    -------
+    ndarray (..., 7)
+        The same poses; q and -q are one rotation, but their average is not.
+    """
+    poses, reference = np.broadcast_arrays(np.asarray(poses, dtype=float), np.asarray(reference, dtype=float))
+    aligned = poses.copy()
+    flip = np.einsum("...i,...i->...", poses[..., 3:], reference[..., 3:]) < 0.0
+    aligned[flip, 3:] *= -1.0
+    return aligned
+
+
+class ExtremeLearningMachine:
+    """Radial basis network from wavelength shifts to the tip pose, learned online.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Draws the centres ~ U(-1, 1) and the widths ~ U(width_range) * inputs, once.
+    inputs : int
+        Number of gratings l.
+    hidden : int
+        Number of hidden nodes N (paper: 200).
+    width_range : tuple of float
+        Range of the node widths per input dimension [-].
+    input_scale : float
+        Wavelength shift that becomes 1 at the input [m]; about a third of the range of shifts.
+    regularisation : float
+        Ridge added to the normal matrix of the first solution, > 0 [-].
+    forgetting : float
+        Weight w of the past per sample, in (0, 1] [-].
+    maximum_trace : float
+        Bound on the trace of the covariance H; forgetting pauses where it would be exceeded [-].
+
+    Notes
+    -----
+    The shift is in metres, a pose is ``(x, y, z, qx, qy, qz, qw)`` in metres with a scalar-last unit
+    quaternion. H is kept as one triangle, so it is symmetric by construction.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> network = ExtremeLearningMachine(rng, inputs=2, hidden=20, regularisation=1e-8)
+    >>> shifts = 5e-11 * rng.uniform(-1, 1, (200, 2))
+    >>> poses = np.zeros((200, 7)); poses[:, 0] = 1e8 * shifts[:, 0]; poses[:, 6] = 1.0
+    >>> network.fit(shifts, poses)
+    >>> bool(abs(network.predict([2e-11, 0.0])[0] - 2e-3) < 1e-5)
+    True
+    """
+
+    def __init__(
+        self,
+        rng: np.random.Generator,
+        *,
+        inputs: int = 17,
+        hidden: int = 200,
+        width_range: tuple[float, float] = (1.0, 10.0),
+        input_scale: float = 5e-11,
+        regularisation: float = 1e-4,
+        forgetting: float = 0.999,
+        maximum_trace: float = 1e7,
+    ) -> None:
+        if inputs < 1 or hidden < 1:
+            raise ValueError(f"inputs and hidden must be at least 1, got {inputs} and {hidden}")
+        if not 0.0 < width_range[0] <= width_range[1]:
+            raise ValueError(f"width_range must be increasing and above 0, got {width_range}")
+        for name, value in (("input_scale", input_scale), ("regularisation", regularisation)):
+            if not (np.isfinite(value) and value > 0.0):
+                raise ValueError(f"{name} must be finite and above 0, got {value}")
+        if not 0.0 < forgetting <= 1.0:
+            raise ValueError(f"forgetting must lie in (0, 1], got {forgetting}")
+        if not maximum_trace > 0.0:
+            raise ValueError(f"maximum_trace must be above 0, got {maximum_trace}")
+        self.centres = rng.uniform(-1.0, 1.0, (hidden, inputs))
+        self.widths = rng.uniform(*width_range, hidden) * inputs
+        self.input_scale = input_scale
+        self.regularisation = regularisation
+        self.forgetting = forgetting
+        self.maximum_trace = maximum_trace
+        self.weights = np.zeros((hidden, POSE_SIZE))
+        self.weights[:, 6] = 1.0 / hidden
+        self.label_variance = 0.0
+        self.is_fitted = False
+        self._covariance = np.asfortranarray(np.eye(hidden) / regularisation)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance H of the output weights, ``(N, N)``, before scaling by the label variance [-]."""
+        lower = np.tril(self._covariance)
+        return lower + np.tril(lower, -1).T
+
+    @property
+    def trace(self) -> float:
+        """Trace of the covariance [-]."""
+        return float(self._covariance.diagonal().sum())
+
+    def hidden_output(self, shift: ArrayLike) -> Array:
+        """Rows of the hidden-layer output matrix, ``(..., N)`` for shifts ``(..., l)`` [m] (Eqs. (3), (4)).
+
+        Raises
+        ------
+        ValueError
+            If the number of gratings is wrong or a shift is not finite; the message names the gratings.
+        """
+        shift = np.asarray(shift, dtype=float)
+        if shift.ndim == 0 or shift.shape[-1] != self.centres.shape[1]:
+            raise ValueError(f"shift must end in {self.centres.shape[1]} gratings, got shape {shift.shape}")
+        if not np.isfinite(shift).all():
+            broken = np.unique(np.nonzero(~np.isfinite(shift))[-1])
+            raise ValueError(
+                f"shift of gratings {broken.tolist()} is not finite; repair it with a GratingMask"
+            )
+        return radial_basis(shift / self.input_scale, self.centres, self.widths)
+
+    def fit(self, shifts: ArrayLike, poses: ArrayLike) -> None:
+        """Solve the output weights for a first batch of samples (Eqs. (5)-(7), (9); Errata VS-6, VS-7).
+
+        Parameters
+        ----------
+        shifts : array_like (N0, l)
+            Wavelength shifts [m].
+        poses : array_like (N0, 7)
+            Labels: poses from the camera [m, -].
+
+        Raises
+        ------
+        ValueError
+            If the samples do not match or are not finite.
+        """
+        poses = np.asarray(poses, dtype=float)
+        hidden = self.hidden_output(shifts)
+        if hidden.ndim != 2 or poses.shape != (len(hidden), POSE_SIZE) or not len(poses):
+            raise ValueError(f"expected poses ({len(hidden)}, {POSE_SIZE}), got {poses.shape}")
+        if not np.isfinite(poses).all():
+            raise ValueError(f"pose of sample {np.argwhere(~np.isfinite(poses))[0, 0]} is not finite")
+        labels = same_hemisphere(poses, poses[0])
+        factor = cho_factor(hidden.T @ hidden + self.regularisation * np.eye(hidden.shape[1]), lower=True)
+        self.weights = cho_solve(factor, hidden.T @ labels)
+        self._covariance = np.asfortranarray(cho_solve(factor, np.eye(hidden.shape[1])))
+        self.label_variance = float(np.mean((labels - hidden @ self.weights)[:, :3] ** 2))
+        self.is_fitted = True
+
+    def predict(self, shift: ArrayLike) -> Array:
+        """Tip poses ``(..., 7)`` for shifts ``(..., l)`` [m], with unit quaternions (Eqs. (1), (2), (8))."""
+        return self._pose(self.hidden_output(shift) @ self.weights)
+
+    def predict_with_variance(self, shift: ArrayLike) -> tuple[Array, float]:
+        """Pose ``(7,)`` and the variance of each of its position components [m^2] for one shift.
+
+        The variance is that of recursive least squares, ``sigma^2 (1 + phi H phi')``, with sigma the running
+        label residual.
+        """
+        hidden = self.hidden_output(shift)
+        spread = hidden @ dsymv(1.0, self._covariance, hidden, lower=1)
+        return self._pose(hidden @ self.weights), self.label_variance * (1.0 + max(float(spread), 0.0))
+
+    def update(self, shift: ArrayLike, pose: ArrayLike) -> UpdateResult:
+        """Learn one sample (Eqs. (10)-(17) in their corrected, cumulative form; Errata VS-2, VS-3).
+
+        Parameters
+        ----------
+        shift : array_like (l,)
+            Wavelength shifts [m].
+        pose : array_like (7,)
+            Label: pose from the camera [m, -]; the sign of its quaternion does not matter.
+
+        Returns
+        -------
+        UpdateResult
+            Errors before and after learning; a label that is not finite, or a covariance that lost its
+            positive definiteness, is refused and leaves the network as it was.
+        """
+        hidden = self.hidden_output(shift)
+        raw = hidden @ self.weights
+        label = np.asarray(pose, dtype=float)
+        if label.shape != (POSE_SIZE,):
+            raise ValueError(f"pose must be ({POSE_SIZE},), got {label.shape}")
+        if not np.isfinite(label).all():
+            return UpdateResult(
+                np.full(POSE_SIZE, np.nan), np.full(POSE_SIZE, np.nan), False, "label not finite"
+            )
+        if label[3:] @ raw[3:] < 0.0:
+            label = np.concatenate([label[:3], -label[3:]])
+        innovation = label - raw
+        direction = dsymv(1.0, self._covariance, hidden, lower=1)
+        spread = float(hidden @ direction)
+        if not 0.0 <= spread < np.inf:
+            return UpdateResult(innovation, innovation, False, "covariance not positive definite")
+        forgetting = self.forgetting if self.trace <= self.forgetting * self.maximum_trace else 1.0
+        scale = 1.0 / (forgetting + spread)
+        self.weights += np.multiply.outer(scale * direction, innovation)
+        dsyr(-scale, direction, lower=1, a=self._covariance, overwrite_a=1)
+        if forgetting < 1.0:
+            self._covariance /= forgetting
+        residual = innovation * (forgetting * scale)
+        self.label_variance += 0.005 * (float(innovation[:3] @ residual[:3]) / 3.0 - self.label_variance)
+        return UpdateResult(innovation, residual, True)
+
+    @staticmethod
+    def _pose(raw: Array) -> Array:
+        pose = raw.copy()
+        pose[..., 3:] = unit_quaternion(raw[..., 3:])
+        return pose
