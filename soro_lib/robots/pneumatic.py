@@ -1,0 +1,122 @@
+"""The one-segment pneumatic arm of Wang et al., Section III-A, with three chambers.
+
+The paper's angle, curvature and radius (Eqs. (19)-(21)) are 0/0 at the straight arm and its arctangent folds half of the plane.
+The same arc is linear in the chamber lengths when written with bending components, which needs neither.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from soro_lib.arcs import routing_matrix
+from soro_lib.robots.base import FloatArray, Robot, require_finite, require_positive
+
+CHAMBER_ANGLES = np.pi / 2.0 + 2.0 * np.pi / 3.0 * np.arange(3)
+"""Directions of the three chambers about z [rad]: 90, 210 and 330 degrees, as Eqs. (19)-(22) imply."""
+
+
+@dataclass(frozen=True)
+class PneumaticArm(Robot):
+    """One soft segment bent and stretched by three chambers; it bends away from the longest one.
+
+    The actuation is the three chamber lengths [m]. The base frame has its origin at the base and z along the
+    straight arm; the paper's displacements are relative to the tip at rest, see :meth:`displacement`.
+
+    Parameters
+    ----------
+    chamber_distance : float
+        Distance d of the chambers from the axis [m] (Wang et al., Section IV-A).
+    rest_length : float
+        Length of the unactuated segment [m] (Section IV-A).
+    minimum_length, maximum_length : float
+        Limits of a chamber length [m]. The paper prints none; half to twice the length at rest is assumed.
+    motor_gains : tuple of 3 float
+        Diagonal of alpha in Eq. (27) [motor unit per m]. The paper prints none.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range; the message names it and its bound.
+
+    Examples
+    --------
+    >>> arm = PneumaticArm()
+    >>> arm.tip([0.09, 0.09, 0.09]).round(3)
+    array([0.  , 0.  , 0.09])
+    """
+
+    chamber_distance: float = 5.1e-3
+    rest_length: float = 0.09
+    minimum_length: float = 0.045
+    maximum_length: float = 0.18
+    motor_gains: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    actuator_names: tuple[str, ...] = field(
+        default=("chamber 1 [m]", "chamber 2 [m]", "chamber 3 [m]"), init=False, repr=False
+    )
+
+    def __post_init__(self) -> None:
+        require_positive(chamber_distance=self.chamber_distance, minimum_length=self.minimum_length)
+        if not self.minimum_length <= self.rest_length <= self.maximum_length < np.inf:
+            raise ValueError(
+                f"minimum_length <= rest_length <= maximum_length must hold, got {self.minimum_length!r}, "
+                f"{self.rest_length!r}, {self.maximum_length!r}"
+            )
+        if len(self.motor_gains) != 3 or not all(
+            np.isfinite(gain) and gain != 0 for gain in self.motor_gains
+        ):
+            raise ValueError(
+                f"motor_gains must be three finite numbers other than 0, got {self.motor_gains!r}"
+            )
+
+    @cached_property
+    def lower(self) -> FloatArray:
+        """Lower limits of the chamber lengths [m]."""
+        return np.full(3, self.minimum_length)
+
+    @cached_property
+    def upper(self) -> FloatArray:
+        """Upper limits of the chamber lengths [m]."""
+        return np.full(3, self.maximum_length)
+
+    @cached_property
+    def home(self) -> FloatArray:
+        """The three chamber lengths at rest [m]."""
+        return np.full(3, self.rest_length)
+
+    def configuration(self, actuation: ArrayLike) -> FloatArray:
+        """Return the arc of the chamber lengths, shape (..., 1, 3) of (dx, dy, length).
+
+        Wang et al., Eqs. (19)-(21), in the form without a singularity (errata VS): with
+        ``v = (sqrt(3) (l2 - l3) / 2, (l2 + l3) / 2 - l1)``, (dx, dy) = 2 v / (3 d) and length = mean.
+        """
+        return (self.check(actuation) @ self._arc_from_lengths.T)[..., np.newaxis, :]
+
+    def configuration_jacobian(self, actuation: ArrayLike) -> FloatArray:
+        """Return d configuration / d actuation, shape (..., 3, 3): the same everywhere."""
+        batch_shape = self.check(actuation).shape[:-1]
+        return np.broadcast_to(self._arc_from_lengths, (*batch_shape, 3, 3))
+
+    def displacement(self, actuation: ArrayLike) -> FloatArray:
+        """Return the tip position relative to the tip at rest [m], shape (..., 3): the origin of Section II-A."""
+        return self.tip(actuation) - np.array([0.0, 0.0, self.rest_length])
+
+    def chamber_lengths(self, configuration: ArrayLike) -> FloatArray:
+        """Return the chamber lengths [m], shape (..., 3), of one arc, shape (..., 1, 3): the inverse map."""
+        arcs = np.asarray(configuration, dtype=float)
+        if arcs.shape[-2:] != (1, 3):
+            raise ValueError(f"configuration must have shape (..., 1, 3), got {arcs.shape}")
+        return require_finite(arcs[..., 0, :], "configuration") @ self._lengths_from_arc.T
+
+    def motor_commands(self, actuation: ArrayLike) -> FloatArray:
+        """Return the motor commands ``alpha (lengths - rest)``, shape (..., 3): Wang et al., Eq. (27)."""
+        return np.asarray(self.motor_gains) * (self.check(actuation) - self.home)
+
+    @cached_property
+    def _lengths_from_arc(self) -> FloatArray:
+        return routing_matrix(self.chamber_distance, CHAMBER_ANGLES)
+
+    @cached_property
+    def _arc_from_lengths(self) -> FloatArray:
+        return np.linalg.inv(self._lengths_from_arc)
