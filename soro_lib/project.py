@@ -24,3 +24,13 @@ def output_directory(slug: str) -> Path:
     directory = Path(os.environ.get("SORO_OUTPUT", ROOT / "build" / "lab" / slug))
     directory.mkdir(parents=True, exist_ok=True)
     return directory
+
+
+def figures_directory(slug: str) -> Path:
+    """Return the folder with the finished figures and tables of one notebook, for reading.
+
+    The runner names the folder of the current run in ``SORO_FIGURES``; what that run has not produced is
+    read from the committed ``figures/<slug>``.
+    """
+    current_run = Path(os.environ.get("SORO_FIGURES", ROOT / "figures")) / slug
+    return current_run if current_run.is_dir() else ROOT / "figures" / slug

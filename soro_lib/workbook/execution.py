@@ -1,0 +1,179 @@
+"""One notebook in one kernel: papermill with a clean working directory, headless and on one thread."""
+
+import os
+import signal
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import papermill
+from nbclient.exceptions import CellTimeoutError, DeadKernelError
+from papermill.clientwrap import PapermillNotebookClient
+from papermill.engines import NBClientEngine, papermill_engines
+from papermill.exceptions import PapermillExecutionError
+
+from soro_lib.workbook.notebooks import Notebook
+
+SINGLE_THREAD = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "OPENCV_FOR_THREADS_NUM",
+)
+ENGINE = "soro-workbook"
+
+
+class NotebookFailure(Exception):
+    """A cell failed; the message names the cell and the error."""
+
+
+class Interrupted(Exception):
+    """The kernel was ended from outside."""
+
+
+@dataclass
+class Execution:
+    """A notebook on its way through a kernel.
+
+    Parameters
+    ----------
+    notebook : Notebook
+        What to run.
+    parameters : mapping
+        Values to inject after the parameters cell.
+    copy : Path
+        Where papermill writes the executed notebook, cell by cell.
+    environment : mapping
+        Environment of the kernel.
+    working_directory : Path
+        Where the kernel runs.
+    cell_timeout : int or None
+        Longest time for one cell [s].
+    on_cell : callable
+        Called with the number of the code cell that starts, counted from 1.
+    """
+
+    notebook: Notebook
+    parameters: Mapping[str, Any]
+    copy: Path
+    environment: Mapping[str, str]
+    working_directory: Path
+    cell_timeout: int | None
+    on_cell: Callable[[int], None]
+    client: PapermillNotebookClient | None = None
+    cell: int = 0
+    interrupted: bool = False
+
+    def run(self) -> None:
+        """Execute all cells.
+
+        Raises
+        ------
+        NotebookFailure
+            If a cell raises, takes too long or takes the kernel down.
+        Interrupted
+            If `kill` was called.
+        """
+        try:
+            papermill.execute_notebook(
+                self.notebook.path,
+                self.copy,
+                parameters=dict(self.parameters),
+                engine_name=ENGINE,
+                kernel_name="python3",
+                language="python",
+                progress_bar=False,
+                execution=self,
+            )
+        except Exception as error:
+            if self.interrupted:
+                raise Interrupted(self.notebook.slug) from None
+            raise NotebookFailure(f"code cell {self.cell}: {self._explain(error)}") from error
+
+    def kill(self) -> None:
+        """End the kernel and everything that it has started, at once."""
+        self.interrupted = True
+        provisioner = self.client and self.client.km and self.client.km.provisioner
+        process = getattr(provisioner, "process", None)
+        if process is not None:
+            with suppress(ProcessLookupError, PermissionError):
+                # The kernel leads its own process group.
+                os.killpg(process.pid, signal.SIGKILL)
+
+    def cell_starts(self, cell: Any, cell_index: int) -> None:
+        """Count the notebook's own code cells as they start."""
+        if self.interrupted:
+            self.kill()
+        if "injected-parameters" not in cell.metadata.get("tags", []):
+            self.cell += 1
+            self.on_cell(self.cell)
+
+    def _explain(self, error: Exception) -> str:
+        match error:
+            case PapermillExecutionError():
+                return f"{error.ename}: {error.evalue}"
+            case CellTimeoutError():
+                return f"took longer than {self.cell_timeout} s"
+            case DeadKernelError():
+                return "the kernel died (out of memory?)"
+        return f"{type(error).__name__}: {error}"
+
+
+class Engine(NBClientEngine):
+    """Papermill's engine, with an environment per kernel and a hook per cell."""
+
+    @classmethod
+    def execute_managed_notebook(
+        cls, nb_man: Any, kernel_name: str, *, execution: Execution, start_timeout: int = 60, **_: Any
+    ) -> nbformat.NotebookNode:
+        """Run the cells of one notebook in a kernel of its own."""
+        execution.client = PapermillNotebookClient(
+            nb_man,
+            kernel_name=kernel_name,
+            startup_timeout=max(start_timeout, 120),
+            timeout=execution.cell_timeout,
+            resources={"metadata": {"path": str(execution.working_directory)}},
+            on_cell_start=execution.cell_starts,
+            extra_arguments=["--log-level=CRITICAL"],
+        )
+        return execution.client.execute(env=dict(execution.environment))
+
+
+papermill_engines.register(ENGINE, Engine)
+
+
+def kernel_environment(root: Path, output: Path, figures: Path, scratch: Path) -> dict[str, str]:
+    """Return the environment that every notebook runs in, whoever runs it and wherever.
+
+    Parameters
+    ----------
+    root : Path
+        Project whose ``soro_lib`` is imported.
+    output : Path
+        Folder that the notebook writes to.
+    figures : Path
+        Folder with the finished figures of this run.
+    scratch : Path
+        Folder for the settings of IPython, in place of the user's own.
+    """
+    modules = (path.relative_to(root).with_suffix("") for path in sorted((root / "soro_lib").rglob("*.py")))
+    names = {".".join(part for part in module.parts if part != "__init__") for module in modules}
+    return {
+        **os.environ,
+        **dict.fromkeys(SINGLE_THREAD, "1"),
+        "SORO_OUTPUT": str(output),
+        "SORO_FIGURES": str(figures),
+        "PYTHONPATH": str(root),
+        "PYTHONHASHSEED": "0",
+        "PYTHONWARNINGS": ",".join(f"error::DeprecationWarning:{name}" for name in sorted(names)),
+        "MPLBACKEND": "Agg",
+        "MPLCONFIGDIR": str(scratch / "matplotlib"),
+        "IPYTHONDIR": str(scratch / "ipython"),
+        "JUPYTER_PREFER_ENV_PATH": "1",
+        "PYDEVD_DISABLE_FILE_VALIDATION": "1",
+    }
