@@ -7,7 +7,9 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     submod_attrs={
         "palm_filter": ["PalmFilter"],
         "extreme_learning_machine": ["ExtremeLearningMachine"],
-        "pose_fusion": ["fuse_poses"],
+        "grating_mask": ["GratingMask"],
+        "pose_fusion": ["InverseVarianceFusion", "fuse_poses"],
         "shape_estimation": ["estimate_shape"],
+        "visual_strain": ["VisualStrainEstimator", "VisualStrainSettings"],
     },
 )

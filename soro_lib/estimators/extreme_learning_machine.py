@@ -261,9 +261,8 @@ class ExtremeLearningMachine:
         if label.shape != (POSE_SIZE,):
             raise ValueError(f"pose must be ({POSE_SIZE},), got {label.shape}")
         if not np.isfinite(label).all():
-            return UpdateResult(
-                np.full(POSE_SIZE, np.nan), np.full(POSE_SIZE, np.nan), False, "label not finite"
-            )
+            unknown = np.full(POSE_SIZE, np.nan)
+            return UpdateResult(unknown, unknown, False, "label not finite")
         if label[3:] @ raw[3:] < 0.0:
             label = np.concatenate([label[:3], -label[3:]])
         innovation = label - raw

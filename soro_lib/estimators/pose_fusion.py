@@ -151,7 +151,7 @@ class InverseVarianceFusion:
         self._filter.H[:, :3] = np.eye(3)
         effect = np.vstack([0.5 * period**2 * np.eye(3), period * np.eye(3)])
         self._filter.Q = acceleration**2 * effect @ effect.T
-        self._started = False
+        self._last = np.full(7, np.nan)
         self._refused = 0
 
     @property
@@ -176,16 +176,12 @@ class InverseVarianceFusion:
         """
         poses = [np.asarray(camera_pose, dtype=float), np.asarray(fibre_pose, dtype=float)]
         variances = [camera_variance, fibre_variance]
-        usable = [
-            bool(np.isfinite(pose).all() and 0.0 < variance < np.inf)
-            for pose, variance in zip(poses, variances)
-        ]
-        if not self._started:
+        pairs = list(zip(poses, variances))
+        usable = [bool(np.isfinite(pose).all() and 0.0 < variance < np.inf) for pose, variance in pairs]
+        if np.isnan(self._last[0]):
             self._start(poses, variances, usable)
         self._filter.predict()
-        accepted = [
-            ok and self._accept(pose, variance) for pose, variance, ok in zip(poses, variances, usable)
-        ]
+        accepted = [ok and self._accept(*pair) for pair, ok in zip(pairs, usable)]
         self._refused = 0 if any(accepted) else self._refused + 1
         if self._refused >= self.reacquire and any(usable):
             self._start(poses, variances, usable)
@@ -202,7 +198,7 @@ class InverseVarianceFusion:
         self._filter.x = np.concatenate([poses[first][:3], np.zeros(3)])[:, None]
         self._filter.P = np.diag([variances[first]] * 3 + [1e-4] * 3)
         self._last = poses[first].copy()
-        self._started, self._refused = True, 0
+        self._refused = 0
 
     def _accept(self, pose: Array, variance: float) -> bool:
         innovation = pose[:3] - self._filter.x[:3, 0]

@@ -204,14 +204,14 @@ class VisualStrainEstimator:
                 self._mask = GratingMask(self._shifts, noise=self.settings.grating_noise)
         return self._remember(
             PoseEstimate(
-                self._camera_pose,
-                self._camera_pose,
-                self._fibre_pose,
-                np.inf,
-                np.nan,
-                error,
-                learnable,
-                masked,
+                pose=self._camera_pose,
+                camera_pose=self._camera_pose,
+                fibre_pose=self._fibre_pose,
+                fibre_variance=np.inf,
+                posterior_error=np.nan,
+                error=error,
+                learned=learnable,
+                masked=masked,
             )
         )
 
@@ -220,15 +220,13 @@ class VisualStrainEstimator:
         return estimate
 
     def _repeat(self, note: str) -> PoseEstimate:
-        last = self._last
-        pose = self._camera_pose if last is None else last.pose
         return PoseEstimate(
-            pose,
-            self._camera_pose,
-            self._fibre_pose,
-            np.inf,
-            np.nan,
-            np.inf,
+            pose=self._camera_pose if self._last is None else self._last.pose,
+            camera_pose=self._camera_pose,
+            fibre_pose=self._fibre_pose,
+            fibre_variance=np.inf,
+            posterior_error=np.nan,
+            error=np.inf,
             learned=False,
             masked=0,
             note=note,

@@ -8,6 +8,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "cable_driven": ["CableDrivenArm"],
         "helix": ["HelixArm"],
         "pneumatic": ["PneumaticArm"],
+        "pneumatic_plant": ["BackboneParameters", "ChamberParameters", "PneumaticPlant"],
         "base": ["ActuationError", "ClippedActuation", "Robot"],
         "soft_growing": ["SoftGrowingArm", "redistribute_actuation"],
     },

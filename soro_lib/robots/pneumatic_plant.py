@@ -1,8 +1,8 @@
 """The three-chamber arm as it might really behave: a simulated plant for the controllers of Wang et al.
 
 The controller believes in a linear map from stepper to chamber and in a constant curvature. The plant does
-not: its steppers lose the fraction of a step, its chambers have a dead band, hardly contract under suction and
-stretch nonlinearly, its transmission has play, and its backbone bends unevenly under its own tip weight.
+not: its steppers lose the fraction of a step, its chambers have a dead band, hardly contract under suction
+and stretch nonlinearly, its transmission has play, and its backbone bends unevenly under the tip's weight.
 Leading axes of commands and parameters broadcast, so a batch of plants runs as one.
 """
 

@@ -5,6 +5,7 @@ import lazy_loader
 __getattr__, __dir__, __all__ = lazy_loader.attach(
     __name__,
     submod_attrs={
+        "fibre": ["FibreGratings"],
         "hand_tracking": ["load_hand_recording"],
         "stereo_vision": ["triangulate"],
     },

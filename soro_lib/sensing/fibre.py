@@ -78,7 +78,7 @@ class FibreGratings:
     @property
     def position(self) -> Array:
         """Place of each grating along the fibre, ``(gratings,)`` [m]."""
-        return self.first + self.spacing * np.arange(self.gratings)
+        return np.asarray(self.first + self.spacing * np.arange(self.gratings), dtype=np.float64)
 
     @property
     def height(self) -> Array:

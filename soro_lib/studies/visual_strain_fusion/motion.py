@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from soro_lib.arcs import chain_transform, routing_matrix
+from soro_lib.arcs import chain_transform
+from soro_lib.robots.pneumatic import PneumaticArm
 from soro_lib.robots.pneumatic_plant import BackboneParameters
 from soro_lib.sensing.fibre import FibreGratings, bond_spread
 
@@ -15,9 +16,7 @@ Array = NDArray[np.float64]
 PERIOD = 0.05
 """Step of control and learning [s]."""
 
-CHAMBER_RADIUS = 0.0051
-CHAMBER_ANGLES = np.deg2rad([90.0, 210.0, 330.0])
-REST_LENGTH = 0.090
+ARM = PneumaticArm()
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class ArmMotion:
 def tip_pose(configuration: ArrayLike) -> Array:
     """Tip poses ``(..., 7)`` of a chain, relative to the tip of the arm at rest (Wang et al., Sec. II-A)."""
     transform = chain_transform(configuration)
-    position = transform[..., :3, 3] - np.array([0.0, 0.0, REST_LENGTH])
+    position = transform[..., :3, 3] - np.array([0.0, 0.0, ARM.rest_length])
     flat = Rotation.from_matrix(transform[..., :3, :3].reshape(-1, 3, 3)).as_quat(canonical=True)
     return np.concatenate([position, flat.reshape(*position.shape[:-1], 4)], axis=-1)
 
@@ -84,11 +83,12 @@ def move(
         Extra curvature by contact [1/m].
     """
     bending = np.asarray(bending, dtype=float)
-    length = REST_LENGTH + CHAMBER_RADIUS * np.hypot(bending[:, 0], bending[:, 1])
-    arcs = np.concatenate([bending, length[:, None]], axis=-1)
-    elongations = arcs @ routing_matrix(CHAMBER_RADIUS, CHAMBER_ANGLES).T - REST_LENGTH
+    length: Array = ARM.rest_length + ARM.chamber_distance * np.hypot(bending[:, 0], bending[:, 1])
+    arcs = np.concatenate([bending, length[:, None]], axis=-1)[:, None, :]
+    elongations = ARM.chamber_lengths(arcs) - ARM.home
     configuration = (backbone or BackboneParameters()).shape(bending, length, contact)
-    return ArmMotion(PERIOD * np.arange(len(bending)), elongations, configuration, tip_pose(configuration))
+    time = np.asarray(PERIOD * np.arange(len(bending)), dtype=np.float64)
+    return ArmMotion(time, elongations, configuration, tip_pose(configuration))
 
 
 def spiral(steps: int = 4000) -> ArmMotion:
