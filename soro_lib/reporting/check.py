@@ -13,6 +13,8 @@ from io import StringIO
 from pathlib import Path
 
 import pandas as pd
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from soro_lib import datacards
 from soro_lib.project import ROOT, SLUGS
@@ -158,23 +160,13 @@ def data(root: Path = ROOT) -> list[str]:
 
 
 def lock(root: Path = ROOT) -> list[str]:
-    """Return direct requirements of ``pyproject.toml`` that ``environment.txt`` does not hold, or not by hash."""
-    from packaging.requirements import Requirement
-
+    """Return direct requirements of ``pyproject.toml`` that ``environment.txt`` does not pin, with a hash."""
     project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     wanted = project["dependencies"] + project.get("optional-dependencies", {}).get("dev", [])
-    locked: dict[str, list[Requirement]] = {}
-    for entry in (root / "environment.txt").read_text(encoding="utf-8").replace("\\\n", " ").splitlines():
-        text = entry.partition(" --hash=")[0].partition("#")[0].strip()
-        if text and not text.startswith("-"):
-            pin = Requirement(text)
-            locked.setdefault(_canonical(pin.name), []).append(pin)
-            if " --hash=" not in entry:
-                locked[_canonical(pin.name)].clear()
+    locked = _locked_versions(root / "environment.txt")
     problems = []
     for requirement in map(Requirement, wanted):
-        pins = locked.get(_canonical(requirement.name), [])
-        versions = [next(iter(pin.specifier)).version for pin in pins]
+        versions = locked.get(canonicalize_name(requirement.name), [])
         if not versions or not all(requirement.specifier.contains(version) for version in versions):
             found = ", ".join(versions) or "no hashed pin"
             problems.append(
@@ -183,10 +175,15 @@ def lock(root: Path = ROOT) -> list[str]:
     return problems
 
 
-def _canonical(name: str) -> str:
-    from packaging.utils import canonicalize_name
-
-    return canonicalize_name(name)
+def _locked_versions(path: Path) -> dict[str, list[str]]:
+    """Return the versions pinned with hashes, by package; several where they depend on the platform."""
+    versions: dict[str, list[str]] = {}
+    for entry in path.read_text(encoding="utf-8").replace("\\\n", " ").splitlines():
+        text, separator, _ = entry.partition(" --hash=")
+        if separator:
+            pin = Requirement(text.strip())
+            versions.setdefault(canonicalize_name(pin.name), []).append(next(iter(pin.specifier)).version)
+    return versions
 
 
 def _git(root: Path, *arguments: str) -> str:

@@ -28,8 +28,8 @@ COLORS = {
 }
 """The palette, by name."""
 
-SERIES = tuple(COLORS[name] for name in ("blue", "orange", "green", "vermillion", "sky", "purple", "black"))
-"""The order in which categories (controllers, segments, objects) take their colours."""
+SERIES = tuple(COLORS[name] for name in ("blue", "orange", "vermillion", "sky", "green", "black", "purple"))
+"""The order in which categories take their colours: neighbours differ in grey, too."""
 
 TRUTH: dict[str, Any] = {"color": COLORS["black"], "linestyle": "-", "linewidth": 1.6, "zorder": 3}
 """What the simulated world really did."""

@@ -31,7 +31,8 @@ def shown(path: Path) -> str:
 
 def suggestion(word: str, vocabulary: Iterable[str]) -> str:
     """Return ``" (did you mean 'x' or 'y'?)"``, or nothing where no word of the vocabulary is close."""
-    close = difflib.get_close_matches(word, list(vocabulary), n=3, cutoff=0.6)
+    spelling = {item.lower(): item for item in vocabulary}
+    close = [spelling[item] for item in difflib.get_close_matches(word.lower(), list(spelling))]
     return f" (did you mean {' or '.join(map(repr, close))}?)" if close else ""
 
 
