@@ -11,9 +11,9 @@ and +y), and its ``length`` [m]. It is the motion along the constant body twist 
         -S d_x & -S d_y & \cos D \end{bmatrix}, \qquad
     t = \ell \begin{bmatrix} C d_x \\ C d_y \\ S \end{bmatrix} = \ell g .
 
-The first two columns of :math:`R` are :math:`e_1 - d_x g` and :math:`e_2 - d_y g`. So a frame is carried along an
-arc with a dozen products per row, and no generic 4 x 4 product is ever formed; the same few lines serve plain
-floats (one arm) and arrays (many arms at once).
+The first two columns of :math:`R` are :math:`e_1 - d_x g` and :math:`e_2 - d_y g`. So a frame is carried
+along an arc with a dozen products per row, and no generic 4 x 4 product is ever formed; the same few lines
+serve plain floats (one arm) and arrays (many arms at once).
 
 Sources: Webster and Jones, IJRR 2010, for the arc; Della Santina et al., 2020, for the coordinates
 ``(dx, dy, length)``; here the angle form of Vervloet, Eqs. (1)-(6), and of Lai et al., Eqs. (22)-(24).
@@ -35,7 +35,11 @@ _SERIES_TERMS = range(1, 8)
 _DS_SERIES = tuple((-1) ** k * 2 * k / math.factorial(2 * k + 1) for k in reversed(_SERIES_TERMS))
 _DC_SERIES = tuple((-1) ** k * 2 * k / math.factorial(2 * k + 2) for k in reversed(_SERIES_TERMS))
 
-_IDENTITY_ROWS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
+_IDENTITY_ROWS: tuple[tuple[Any, ...], ...] = (
+    (1.0, 0.0, 0.0, 0.0),
+    (0.0, 1.0, 0.0, 0.0),
+    (0.0, 0.0, 1.0, 0.0),
+)
 _LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -61,7 +65,8 @@ def arc_transform(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray
 
     Notes
     -----
-    Vervloet, Eqs. (1)-(5), corrected (errata SH-1 to SH-4); Lai et al., Eqs. (23)-(24); Wang et al., Eq. (22).
+    Vervloet, Eqs. (1)-(5), as corrected (errata SH-1 to SH-4); Lai et al., Eqs. (23)-(24); Wang et al.,
+    Eq. (22).
 
     Examples
     --------
@@ -94,8 +99,8 @@ def chain_transform(configuration: ArrayLike) -> FloatArray:
 
     Notes
     -----
-    Vervloet, Eq. (6); Lai et al., Eq. (22). Any finite length is accepted, a negative one too: the formulas continue
-    smoothly, which iterative solvers rely on. Physical limits belong to the robots.
+    Vervloet, Eq. (6); Lai et al., Eq. (22). Any finite length is accepted, a negative one too: the formulas
+    continue smoothly, which iterative solvers rely on. Physical limits belong to the robots.
 
     Examples
     --------
@@ -108,9 +113,9 @@ def chain_transform(configuration: ArrayLike) -> FloatArray:
         for arc in _scalar_arcs(arcs):
             rows = tuple(_carry(row, arc) for row in rows)
         return np.array((*rows, _LAST_ROW))
-    frame = _identity_frame(arcs)
-    for arc in _batch_arcs(arcs):
-        frame = _carry(frame, arc)
+    frame: tuple[Any, ...] = _identity_frame(arcs)
+    for arcs_of_segment in _batch_arcs(arcs):
+        frame = _carry(frame, arcs_of_segment)
     return _pack_transform(frame, arcs.shape[:-2])
 
 
@@ -193,7 +198,7 @@ def backbone(configuration: ArrayLike, points_per_segment: int = 20) -> FloatArr
     frame = _identity_frame(arcs)
     points = [frame[3][..., np.newaxis]]
     fractions = np.arange(1, points_per_segment + 1) / points_per_segment
-    for arc in np.moveaxis(arcs.reshape(-1, *arcs.shape[-2:]), 1, 0):
+    for arc in np.moveaxis(_flat_batch(arcs), 1, 0):
         pieces = _batch_arc(*(arc.T[:, :, np.newaxis] * fractions))
         stretched = _carry(tuple(column[..., np.newaxis] for column in frame), pieces)
         points.append(stretched[3])
@@ -205,8 +210,8 @@ def routing_matrix(radius: float, angles: ArrayLike) -> FloatArray:
     """Return the matrix from an arc to the lengths of the tendons or chambers that run along it.
 
     A strand at distance `radius` from the backbone and at angle `angle` about z keeps its place in every
-    cross-section, so its length is ``length - radius * (dx cos(angle) + dy sin(angle))``: linear in the arc, and
-    invertible for three strands at different angles.
+    cross-section, so its length is ``length - radius * (dx cos(angle) + dy sin(angle))``: linear in the arc,
+    and invertible for three strands at different angles.
 
     Parameters
     ----------
@@ -237,7 +242,10 @@ def _stack_arc(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray:
 
 
 def _as_configuration(configuration: ArrayLike) -> FloatArray:
-    arcs = np.asarray(configuration, dtype=float)
+    try:
+        arcs = np.asarray(configuration, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"configuration must be numbers of shape (..., n, 3): {error}") from None
     if arcs.ndim < 2 or arcs.shape[-1] != 3:
         raise ValueError(f"configuration must have shape (..., n, 3) of (dx, dy, length), got {arcs.shape}")
     if not np.isfinite(arcs).all():
@@ -256,7 +264,7 @@ def _carry(row: Sequence[Any], arc: Sequence[Any]) -> tuple[Any, ...]:
 
 
 def _velocities(row: Sequence[Any], arc: Sequence[Any], slopes: Sequence[Any]) -> tuple[Any, ...]:
-    """Return a row of the velocities of an arc's end: three linear (dx, dy, length), then two angular (dx, dy).
+    """Return a row of an arc's end velocities: three linear (dx, dy, length), then two angular (dx, dy).
 
     The angular ones are the columns of the left Jacobian of SO(3), whose second coefficient
     (1 - S) / D^2 equals C + S'.
@@ -277,7 +285,7 @@ def _velocities(row: Sequence[Any], arc: Sequence[Any], slopes: Sequence[Any]) -
     )
 
 
-def _cross(a: Sequence[Any], b: Sequence[Any]) -> tuple[Any, Any, Any]:
+def _cross(a: Any, b: Any) -> tuple[Any, Any, Any]:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -325,8 +333,12 @@ def _scalar_transform_and_jacobian(arcs: FloatArray) -> tuple[FloatArray, FloatA
 
 def _batch_arcs(arcs: FloatArray) -> list[tuple[FloatArray, ...]]:
     """Return (dx, dy, length, S, C, cos D) of every arc, each an array over the chains of the batch."""
-    columns = np.ascontiguousarray(arcs.reshape(-1, arcs.shape[-2] * 3).T)
-    return [_batch_arc(*columns[start : start + 3]) for start in range(0, len(columns), 3)]
+    columns = np.ascontiguousarray(_flat_batch(arcs).T)
+    return [_batch_arc(*arc) for arc in columns.transpose(1, 0, 2)]
+
+
+def _flat_batch(arcs: FloatArray) -> FloatArray:
+    return arcs.reshape(math.prod(arcs.shape[:-2]), *arcs.shape[-2:])
 
 
 def _batch_arc(dx: FloatArray, dy: FloatArray, length: FloatArray) -> tuple[FloatArray, ...]:

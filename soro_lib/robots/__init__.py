@@ -9,7 +9,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "helix": ["HelixArm"],
         "pneumatic": ["PneumaticArm"],
         "pneumatic_plant": ["BackboneParameters", "ChamberParameters", "PneumaticPlant"],
-        "base": ["ActuationError", "ClippedActuation", "Robot"],
+        "base": ["ActuationError", "ActuationWarning", "ClippedActuation", "Robot"],
         "soft_growing": ["SoftGrowingArm", "redistribute_actuation"],
     },
 )

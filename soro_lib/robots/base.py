@@ -2,11 +2,13 @@
 
 The rule: a command outside the limits is never followed and never silently changed. ``forward``, ``jacobian``
 and everything else that takes an actuation raise :class:`ActuationError`, naming the actuator, the value and
-the bound; a caller that wants the nearest admissible command asks ``clip`` for it and is told what was changed.
+the bound. A limit that couples several actuators, as the bend of a segment of the Helix, is reported by an
+:class:`ActuationWarning`, so that every point from ``lower`` to ``upper`` can still be evaluated. A caller
+that wants the nearest admissible command asks ``clip`` for it and is told what was changed.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +23,10 @@ LIMIT_TOLERANCE = 1e-9
 
 class ActuationError(ValueError):
     """An actuation is malformed, not finite, or outside the limits of its arm."""
+
+
+class ActuationWarning(UserWarning):
+    """An actuation is within the limits of every actuator, but violates a limit that couples several."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +53,12 @@ class ClippedActuation:
         return bool(self.clipped.any())
 
 
+@runtime_checkable
 class Robot(Protocol):
     """The small interface that every arm offers and every controller relies on.
 
-    An arm inherits from this class and supplies its limits, ``configuration`` and ``configuration_jacobian``; the
-    kinematics follow. Another object that merely has these members serves a controller just as well.
+    An arm inherits from this class and supplies its limits, ``configuration`` and ``configuration_jacobian``;
+    the kinematics follow. Another object that merely has these members serves a controller just as well.
     """
 
     actuator_names: tuple[str, ...]
@@ -104,7 +111,7 @@ class Robot(Protocol):
         return self.forward(actuation)[..., :3, 3]
 
     def backbone(self, actuation: ArrayLike, points_per_segment: int = 20) -> FloatArray:
-        """Return points [m] along the arm in the base frame, shape (..., k, 3); see `soro_lib.arcs.backbone`."""
+        """Return points [m] along the arm in the base frame, shape (..., k, 3); see `arcs.backbone`."""
         return backbone(self.configuration(actuation), points_per_segment)
 
     def check(self, actuation: ArrayLike) -> FloatArray:
@@ -158,9 +165,18 @@ def clip_actuation(
     ActuationError
         If the actuation is malformed or not finite: there is no nearest value then.
     """
-    array = require_finite(_as_actuation(actuation, names), "actuation")
-    clipped = np.clip(array, lower, upper)
-    return ClippedActuation(clipped, clipped != array, array - clipped)
+    array = finite_actuation(actuation, names)
+    return report_clipping(array, np.clip(array, lower, upper))
+
+
+def finite_actuation(actuation: ArrayLike, names: tuple[str, ...]) -> FloatArray:
+    """Return the actuation as an array, shape (..., n), or raise `ActuationError` where it is not finite."""
+    return require_finite(_as_actuation(actuation, names), "actuation")
+
+
+def report_clipping(requested: FloatArray, admissible: FloatArray) -> ClippedActuation:
+    """Return the admissible actuation and the report of how it differs from the requested one."""
+    return ClippedActuation(admissible, admissible != requested, requested - admissible)
 
 
 def require_finite(array: FloatArray, name: str) -> FloatArray:
@@ -179,7 +195,10 @@ def require_positive(**values: float) -> None:
 
 
 def _as_actuation(actuation: ArrayLike, names: tuple[str, ...]) -> FloatArray:
-    array = np.asarray(actuation, dtype=float)
+    try:
+        array = np.asarray(actuation, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ActuationError(f"actuation must be numbers of shape (..., {len(names)}): {error}") from None
     if array.ndim == 0 or array.shape[-1] != len(names):
         raise ActuationError(
             f"actuation must have shape (..., {len(names)}) of ({', '.join(names)}), got {array.shape}"

@@ -1,8 +1,8 @@
-"""The two-segment cable-driven arm on a slide, with the compressible curvature model of Lai et al., Section II.
+"""The two-segment cable-driven arm on a slide: compressible curvature model of Lai et al., Section II.
 
 Pulling a cable both bends and shortens its segment, and the distal cables load the proximal segment too.
-Written with moment vectors instead of the paper's angles, nothing is singular at the straight arm: the bending
-angle of a segment is the vector ``(dx, dy) = moment * length / EI``.
+Written with moment vectors instead of the paper's angles, nothing is singular at the straight arm: the
+bending angle of a segment is the vector ``(dx, dy) = moment * length / EI``.
 """
 
 from dataclasses import dataclass, field
@@ -22,9 +22,9 @@ CABLE_ANGLES = 2.0 * np.pi / 3.0 * np.arange(3)
 class CableDrivenArm(Robot):
     """Two soft segments with three cables each, on a linear slide.
 
-    The actuation is (slide [m], q11, q12, q13, q21, q22, q23): three proximal, then three distal cable commands in
-    the paper's range -2 to 0, read as minus the tension in N. The base frame is the paper's world frame {W}:
-    the slide moves along +z, the straight arm points along +z.
+    The actuation is (slide [m], q11, q12, q13, q21, q22, q23): three proximal, then three distal cable
+    commands in the paper's range -2 to 0, read as minus the tension in N. The base frame is the paper's world
+    frame {W}: the slide moves along +z, the straight arm points along +z.
 
     Parameters
     ----------
@@ -128,14 +128,14 @@ class CableDrivenArm(Robot):
 
     @cached_property
     def home(self) -> FloatArray:
-        """Straight and unloaded; the slide at 50 mm where the stroke allows, as in Table II, configuration 0."""
+        """Straight and unloaded; the slide at 50 mm where its stroke allows (Table II, configuration 0)."""
         return np.array([min(0.05, self.slide_length)] + 6 * [0.0])
 
     def segments(self, actuation: ArrayLike) -> FloatArray:
         """Return the two soft segments, shape (..., 2, 3) of (dx, dy, length), proximal first.
 
-        Lai et al., Eqs. (1)-(3) as one vector equation (errata GS-1 and GS-2): the moments of the cables add as
-        vectors, and each segment bends by ``moment * length / EI``.
+        Lai et al., Eqs. (1)-(3) as one vector equation (errata GS-1 and GS-2): the moments of the cables add
+        as vectors, and each segment bends by ``moment * length / EI``.
         """
         forces, moments = self._loads(self.check(actuation))
         lengths = self.segment_length - forces / self.axial_stiffness
@@ -174,7 +174,7 @@ class CableDrivenArm(Robot):
         return pieces.reshape(*forces.shape[:-1], -1, 7)
 
     def mid_point(self, actuation: ArrayLike) -> FloatArray:
-        """Return the end of the proximal segment, its cap included, shape (..., 3) [m]: frame {M} of the paper."""
+        """Return the end of the proximal segment and its cap [m], shape (..., 3): frame {M} of the paper."""
         return self.mid_pose(actuation)[..., :3, 3]
 
     def mid_pose(self, actuation: ArrayLike) -> FloatArray:
@@ -182,7 +182,7 @@ class CableDrivenArm(Robot):
         return chain_transform(self.configuration(actuation)[..., : self._mid_pieces, :])
 
     def mid_jacobian(self, actuation: ArrayLike) -> FloatArray:
-        """Return the Jacobian of frame {M}, shape (..., 6, 7): J_M of Lai et al., Eq. (27), and its rotation."""
+        """Return the Jacobian of {M}, shape (..., 6, 7): the linear rows are J_M of Lai et al., Eq. (27)."""
         count = self._mid_pieces
         pieces = self.configuration(actuation)[..., :count, :]
         return chain_jacobian(pieces) @ self.configuration_jacobian(actuation)[..., : 3 * count, :]

@@ -1,24 +1,28 @@
 """The three-segment tendon-driven arm "Helix" of Vervloet, Sections 2.1 and 3.1, with its gripper.
 
-Two frames are in use. ``arm_base`` has z along the hanging arm, downward: all kinematics are written in it. ``origin`` has z
-upward: the camera system and the text of Section 4 use it. They differ by a half turn about x.
+Two frames are in use. ``arm_base`` has z along the hanging arm, downward: all kinematics are written in it.
+``origin`` has z upward: the camera system and the text of Section 4 use it. They differ by a half turn about
+x.
 """
 
+import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from soro_lib.arcs import chain_transform_and_jacobian, routing_matrix
+from soro_lib.arcs import chain_transform, chain_transform_and_jacobian, routing_matrix
 from soro_lib.robots.base import (
     LIMIT_TOLERANCE,
     ActuationError,
+    ActuationWarning,
     ClippedActuation,
     FloatArray,
     Robot,
     check_actuation,
-    clip_actuation,
+    finite_actuation,
+    report_clipping,
     require_finite,
     require_positive,
 )
@@ -34,9 +38,9 @@ ORIGIN_FROM_ARM_BASE = np.diag([1.0, -1.0, -1.0])
 class HelixArm(Robot):
     """Three tendon-driven segments and a gripper, hanging down.
 
-    The actuation is the state q = (dx1, dy1, l1, dx2, dy2, l2, dx3, dy3, l3) of Eq. (7), which the tendons impose through
-    the map :meth:`tendon_lengths`. Frame: arm_base, z down. The tip of `forward` is the wrist, the end of the
-    third segment; the gripper point lies `gripper_length` further along its z axis.
+    The actuation is the state q = (dx1, dy1, l1, dx2, dy2, l2, dx3, dy3, l3) of Eq. (7), which the tendons
+    impose through the map :meth:`tendon_lengths`. Frame: arm_base, z down. The tip of `forward` is the wrist,
+    the end of the third segment; the gripper point lies `gripper_length` further along its z axis.
 
     Parameters
     ----------
@@ -49,8 +53,8 @@ class HelixArm(Robot):
     gripper_length : float
         Distance from wrist to gripper point [m] (Eq. (13), erratum: the norm, not its square).
     tendon_radius : float
-        Distance of the tendons from the backbone [m]; not printed, 0.03 is supported by the public description
-        of the arm. It cancels wherever all tendons are taut.
+        Distance of the tendons from the backbone [m]; not printed, 0.03 is supported by the public
+        description of the arm. It cancels wherever all tendons are taut.
     tendon_offsets : tuple of 3 float
         Rotation of the tendons of each segment about z [rad]; not printed.
     pulley_radius : float
@@ -114,49 +118,55 @@ class HelixArm(Robot):
     @cached_property
     def lower(self) -> FloatArray:
         """Lower limits of q; each bend is limited by its magnitude too, see `bends_and_lengths`."""
-        return self._as_state([-np.asarray(self.maximum_bends), self.minimum_lengths])
+        return _as_state(-np.asarray(self.maximum_bends), self.minimum_lengths)
 
     @cached_property
     def upper(self) -> FloatArray:
         """Upper limits of q; each bend is limited by its magnitude too, see `bends_and_lengths`."""
-        return self._as_state([self.maximum_bends, self.maximum_lengths])
+        return _as_state(self.maximum_bends, self.maximum_lengths)
 
     @cached_property
     def home(self) -> FloatArray:
         """The calibrated state: straight, at rest length (Vervloet, X_0 of Section 3.1)."""
-        return self._as_state([np.zeros(3), self.rest_lengths])
-
-    @staticmethod
-    def _as_state(bends_and_lengths: list) -> FloatArray:
-        bends, lengths = bends_and_lengths
-        return np.stack([bends, bends, lengths], axis=-1).ravel()
+        return _as_state(np.zeros(3), self.rest_lengths)
 
     def check(self, actuation: ArrayLike) -> FloatArray:
-        """Return q as an array, or raise `ActuationError` if it leaves the limits of Vervloet, Eqs. (10)-(11)."""
+        """Return q as an array: Vervloet, Eqs. (10)-(11).
+
+        Raises
+        ------
+        ActuationError
+            If q is malformed, not finite, or an entry leaves `lower` to `upper`.
+
+        Warns
+        -----
+        ActuationWarning
+            If the bend hypot(dx, dy) of a segment exceeds its limit although dx and dy respect theirs.
+        """
         q = check_actuation(actuation, self.lower, self.upper, self.actuator_names)
         bends = self.bends_and_lengths(q)[..., ::2]
         too_far = bends > np.asarray(self.maximum_bends) * (1.0 + LIMIT_TOLERANCE)
         if too_far.any():
             index = tuple(np.argwhere(too_far)[0])
             segment = int(index[-1])
-            raise ActuationError(
-                f"actuation: the bend hypot(dx, dy) of segment {segment + 1} is {bends[index]:.6g} rad, "
-                f"above {self.maximum_bends[segment]:.6g}"
+            warnings.warn(
+                f"the bend hypot(dx, dy) of segment {segment + 1} is {bends[index]:.6g} rad, "
+                f"above its limit {self.maximum_bends[segment]:.6g}",
+                ActuationWarning,
+                stacklevel=3,
             )
         return q
 
     def clip(self, actuation: ArrayLike) -> ClippedActuation:
-        """Return the nearest q within the limits (bends shrink toward zero in their own plane) and the report."""
-        unlimited = np.full(9, np.inf)
-        q = clip_actuation(actuation, -unlimited, unlimited, self.actuator_names).actuation
+        """Return the nearest q within the limits, bends shrunk in their own plane, and the report."""
+        q = finite_actuation(actuation, self.actuator_names)
         bends = self.bends_and_lengths(q)[..., ::2]
         maximum = np.asarray(self.maximum_bends)
         shrink = np.divide(maximum, bends, out=np.ones_like(bends), where=bends > maximum)
         clipped = q.reshape(*q.shape[:-1], 3, 3).copy()
         clipped[..., :2] *= shrink[..., np.newaxis]
         clipped[..., 2] = np.clip(clipped[..., 2], self.minimum_lengths, self.maximum_lengths)
-        clipped = clipped.reshape(q.shape)
-        return ClippedActuation(clipped, clipped != q, q - clipped)
+        return report_clipping(q, clipped.reshape(q.shape))
 
     def configuration(self, actuation: ArrayLike) -> FloatArray:
         """Return the three segments of q, shape (..., 3, 3) of (dx, dy, length): Vervloet, Eq. (7)."""
@@ -176,10 +186,10 @@ class HelixArm(Robot):
     def tip_points(self, q: ArrayLike) -> FloatArray:
         """Return the wrist and the gripper point, shape (..., 6) [m]: the pose vector X of Vervloet.
 
-        Any finite state is accepted, also one outside the limits: estimates of the state (Section 3.4) are not commands
-        and need not respect them.
+        Any finite state is accepted, also one outside the limits: estimates of the state (Section 3.4) are
+        not commands and need not respect them.
         """
-        return self.tip_points_and_jacobian(q)[0]
+        return self._points(chain_transform(self._segments(q)))
 
     def tip_points_jacobian(self, q: ArrayLike) -> FloatArray:
         """Return dX/dq, shape (..., 6, 9); its rank is 5, since wrist and gripper keep their distance."""
@@ -189,9 +199,9 @@ class HelixArm(Robot):
         """Return `tip_points` and `tip_points_jacobian` from one pass along the arm."""
         wrist, jacobian = chain_transform_and_jacobian(self._segments(q))
         reach = self.gripper_length * wrist[..., :3, 2]
-        points = np.concatenate([wrist[..., :3, 3], wrist[..., :3, 3] + reach], axis=-1)
         swing = np.cross(jacobian[..., 3:, :], reach[..., np.newaxis], axis=-2)
-        return points, np.concatenate([jacobian[..., :3, :], jacobian[..., :3, :] + swing], axis=-2)
+        rows = np.concatenate([jacobian[..., :3, :], jacobian[..., :3, :] + swing], axis=-2)
+        return self._points(wrist), rows
 
     def tendon_lengths(self, q: ArrayLike) -> FloatArray:
         """Return the nine tendon lengths g(q) [m], shape (..., 9), three per segment from base to tip.
@@ -203,23 +213,27 @@ class HelixArm(Robot):
         return lengths.reshape(*lengths.shape[:-2], 9)
 
     def state_from_tendons(self, lengths: ArrayLike) -> FloatArray:
-        """Return the state q, shape (..., 9), of nine tendon lengths [m]: the inverse of :meth:`tendon_lengths`."""
+        """Return the state q, shape (..., 9), of nine tendon lengths [m]: the inverse of `tendon_lengths`."""
         strands = self._segments(lengths, "lengths")
         segments = np.einsum("ijk,...ik->...ij", np.linalg.inv(self._routing), strands)
         return segments.reshape(*segments.shape[:-2], 9)
 
     def motor_angles(self, lengths: ArrayLike) -> FloatArray:
-        """Return the motor angles [rad] relative to calibration, shape (..., 9); pulling shortens a tendon."""
+        """Return the motor angles [rad] from calibration, shape (..., 9), of nine tendon lengths [m]."""
         strands = require_finite(np.asarray(lengths, dtype=float), "lengths")
         change = strands - self.tendon_lengths(self.home)
         return np.asarray(self.motor_orientations) * change / self.pulley_radius
 
     def tendons_from_motors(self, angles: ArrayLike) -> FloatArray:
-        """Return the tendon lengths [m], shape (..., 9), of motor angles [rad]: the inverse of `motor_angles`."""
+        """Return the tendon lengths [m], shape (..., 9), of nine motor angles [rad] from calibration."""
         turned = require_finite(np.asarray(angles, dtype=float), "angles")
         return (
             self.tendon_lengths(self.home) + np.asarray(self.motor_orientations) * turned * self.pulley_radius
         )
+
+    def _points(self, wrist: FloatArray) -> FloatArray:
+        position, pointing = wrist[..., :3, 3], wrist[..., :3, 2]
+        return np.concatenate([position, position + self.gripper_length * pointing], axis=-1)
 
     @cached_property
     def _routing(self) -> FloatArray:
@@ -236,3 +250,7 @@ class HelixArm(Robot):
 def origin_from_arm_base(points: ArrayLike) -> FloatArray:
     """Return points or directions, shape (..., 3), of arm_base (z down) in origin (z up); its own inverse."""
     return np.asarray(points, dtype=float) @ ORIGIN_FROM_ARM_BASE
+
+
+def _as_state(bends: ArrayLike, lengths: ArrayLike) -> FloatArray:
+    return np.stack([bends, bends, lengths], axis=-1).ravel().astype(float)

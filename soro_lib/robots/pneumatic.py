@@ -1,7 +1,8 @@
 """The one-segment pneumatic arm of Wang et al., Section III-A, with three chambers.
 
-The paper's angle, curvature and radius (Eqs. (19)-(21)) are 0/0 at the straight arm and its arctangent folds half of the plane.
-The same arc is linear in the chamber lengths when written with bending components, which needs neither.
+The paper's angle, curvature and radius (Eqs. (19)-(21)) are 0/0 at the straight arm and its arctangent folds
+half of the plane. The same arc is linear in the chamber lengths when written with bending components, which
+needs neither.
 """
 
 from dataclasses import dataclass, field
@@ -99,7 +100,7 @@ class PneumaticArm(Robot):
         return np.broadcast_to(self._arc_from_lengths, (*batch_shape, 3, 3))
 
     def displacement(self, actuation: ArrayLike) -> FloatArray:
-        """Return the tip position relative to the tip at rest [m], shape (..., 3): the origin of Section II-A."""
+        """Return the tip position relative to the tip at rest [m], shape (..., 3), as in Section II-A."""
         return self.tip(actuation) - np.array([0.0, 0.0, self.rest_length])
 
     def chamber_lengths(self, configuration: ArrayLike) -> FloatArray:
@@ -107,7 +108,8 @@ class PneumaticArm(Robot):
         arcs = np.asarray(configuration, dtype=float)
         if arcs.shape[-2:] != (1, 3):
             raise ValueError(f"configuration must have shape (..., 1, 3), got {arcs.shape}")
-        return require_finite(arcs[..., 0, :], "configuration") @ self._lengths_from_arc.T
+        lengths: FloatArray = require_finite(arcs[..., 0, :], "configuration") @ self._lengths_from_arc.T
+        return lengths
 
     def motor_commands(self, actuation: ArrayLike) -> FloatArray:
         """Return the motor commands ``alpha (lengths - rest)``, shape (..., 3): Wang et al., Eq. (27)."""
@@ -119,4 +121,4 @@ class PneumaticArm(Robot):
 
     @cached_property
     def _arc_from_lengths(self) -> FloatArray:
-        return np.linalg.inv(self._lengths_from_arc)
+        return np.linalg.inv(self._lengths_from_arc).astype(np.float64)

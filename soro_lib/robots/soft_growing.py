@@ -1,7 +1,8 @@
 """The soft-growing arm of the shared-control paper: it steers at its base and grows by eversion.
 
-The body is a straight tube from the base to the tip, as the authors' program draws it: a pivot at the base (an arc of
-length zero) and a straight piece. Motor space and redistribution follow the paper's supplement, Eqs. (1)-(10).
+The body is a straight tube from the base to the tip, as the authors' program draws it: a pivot at the base
+(an arc of length zero) and a straight piece. Motor space and redistribution follow the paper's supplement,
+Eqs. (1)-(10).
 """
 
 from dataclasses import dataclass, field
@@ -26,15 +27,15 @@ REDISTRIBUTION = 0.3
 class SoftGrowingArm(Robot):
     """A straight tube that everts to any point below its base.
 
-    The actuation is the tip position (x, y, z) [m] in the base frame, z down along gravity. The tip frame is the base
-    frame turned about the horizontal axis that carries z onto the body, the shortest way; so it is
+    The actuation is the tip position (x, y, z) [m] in the base frame, z down along gravity. The tip frame is
+    the base frame turned about the horizontal axis that carries z onto the body, the shortest way; so it is
     regular everywhere except at the base itself and straight above it, which the limits exclude.
 
     Parameters
     ----------
     lower_limit, upper_limit : tuple of 3 float
-        Corners of the box of admissible tip positions [m]. Neither the paper nor the authors' program limits the arm;
-        the default, 1 m about the base and 1 cm below it, holds every item, target and lifting goal.
+        Corners of the box of admissible tip positions [m]. Neither the paper nor the authors' program limits
+        the arm; the default, 1 m about the base and 1 cm below it, holds every item, target and lifting goal.
 
     Raises
     ------
@@ -130,8 +131,8 @@ class SoftGrowingArm(Robot):
     def motor_coordinates(self, point: ArrayLike) -> FloatArray:
         """Return (s1, s2, s3, eversion) [m], shape (..., 4), of a point (..., 3) in the base frame.
 
-        Supplement, Eqs. (2)-(5); see `steering_coordinates` and `eversion_length`. Differences of points are accepted
-        too, so the limits of the tip do not apply.
+        Supplement, Eqs. (2)-(5); see `steering_coordinates` and `eversion_length`. Differences of points are
+        accepted too, so the limits of the tip do not apply.
         """
         position = _as_points(point, 3, "point")
         steering = steering_coordinates(position[..., :2])
@@ -161,9 +162,9 @@ class SoftGrowingArm(Robot):
 def steering_coordinates(point: ArrayLike) -> FloatArray:
     """Return the pulls (s1, s2, s3) [m], shape (..., 3), that reach a point (x, y) [m] of the plane.
 
-    Supplement, Eqs. (2)-(4), corrected (Eqs. (3) and (4) halve y, and their sectors overlap or leave a gap). All solutions of
-    Eq. (1) differ by a common amount, and each sector's formula is the one whose smallest pull is zero; so one
-    formula, less its minimum, serves all three sectors.
+    Supplement, Eqs. (2)-(4), corrected (Eqs. (3) and (4) halve y, and their sectors overlap or leave a gap).
+    All solutions of Eq. (1) differ by a common amount, and each sector's formula is the one whose smallest
+    pull is zero; so one formula, less its minimum, serves all three sectors.
     """
     x, y = np.moveaxis(_as_points(point, 2, "point"), -1, 0)
     pulls = np.stack([x - y / np.sqrt(3.0), x + y / np.sqrt(3.0), np.zeros_like(x)], axis=-1)
@@ -171,7 +172,7 @@ def steering_coordinates(point: ArrayLike) -> FloatArray:
 
 
 def eversion_length(point: ArrayLike) -> FloatArray:
-    """Return the length of the everted body [m], shape (...), with its tip at a point (..., 3): supplement, Eq. (5)."""
+    """Return the body length [m], shape (...), with its tip at a point (..., 3) [m]: supplement, Eq. (5)."""
     return np.sqrt((np.asarray(point, dtype=float) ** 2).sum(axis=-1))
 
 
