@@ -1,0 +1,115 @@
+"""From the hand over the tracker to a goal for the tip; Lai et al., Eqs. (4), (5), (19), (20).
+
+Device axes: x right, y up, z toward the user. Robot axes: z along the straight arm.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from soro_lib.controllers.gestures import Mode
+
+Vector = tuple[float, float, float]
+
+
+class TipGoal(NamedTuple):
+    """Where the tip shall be [m] and where it shall point (unit vector), in the frame {W}."""
+
+    position: Vector
+    direction: Vector
+
+
+@dataclass(frozen=True)
+class PalmMapping:
+    """The scaling of hand motion, Gamma in Lai et al., Eq. (4).
+
+    Read per axis (erratum GS-5), (4) scales the palm position by (c_x, c_y, 150/z_P + c_z) in mm, so that the height
+    becomes ``offset + c_z * height``: a higher hand means a shorter reach. The paper's z_P is the device's
+    height y, its y_P the device's z (erratum GS-6). The palm normal goes through the same signed permutation
+    as the position (erratum GS-7), so that a flat palm means a straight arm.
+
+    Parameters
+    ----------
+    scale_x, scale_y, scale_z : float
+        c_x, c_y, c_z [-].
+    offset : float
+        The 150 mm of (4) [m].
+    half_width : float
+        Half the edge of the allowed box, right and toward the user [m].
+    lowest, highest : float
+        Heights of the allowed box above the device [m].
+    maximum_tilt : float
+        Largest angle of the commanded direction from straight [rad].
+    """
+
+    scale_x: float = 0.2
+    scale_y: float = -0.2
+    scale_z: float = -0.2
+    offset: float = 0.150
+    half_width: float = 0.150
+    lowest: float = 0.100
+    highest: float = 0.400
+    maximum_tilt: float = math.radians(30.0)
+
+    def __post_init__(self) -> None:
+        for name in ("scale_x", "scale_y", "scale_z", "offset"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"PalmMapping.{name} = {getattr(self, name)}, must be finite")
+        if not 0 < self.half_width < math.inf:
+            raise ValueError(f"PalmMapping.half_width = {self.half_width}, must be > 0 and finite")
+        if not 0 < self.lowest < self.highest < math.inf:
+            raise ValueError(f"PalmMapping: 0 < lowest < highest must hold, got {self.lowest}, {self.highest}")
+        if not 0 < self.maximum_tilt < math.pi / 2:
+            raise ValueError(f"PalmMapping.maximum_tilt = {self.maximum_tilt}, must be in (0, pi/2)")
+
+    def in_box(self, palm: Vector) -> bool:
+        """Return whether the palm [m, device frame] is where the paper allows it (Section IV-A)."""
+        x, y, z = palm
+        return abs(x) <= self.half_width and abs(z) <= self.half_width and self.lowest <= y <= self.highest
+
+    def position(self, palm: Vector) -> Vector:
+        """Return the tip position [m] that a palm position [m, device frame] asks for; Eqs. (4), (5)."""
+        x, y, z = palm
+        return self.scale_x * x, self.scale_y * z, self.offset + self.scale_z * y
+
+    def palm(self, position: Vector) -> Vector:
+        """Return the palm position [m, device frame] that asks for a tip position [m]: the inverse of (4)."""
+        x, y, z = position
+        return x / self.scale_x, (z - self.offset) / self.scale_z, y / self.scale_y
+
+    def direction(self, normal: Vector) -> Vector:
+        """Return the pointing direction that a palm normal [device frame] asks for, tilt limited."""
+        x, y, z = normal
+        return limited_tilt((x, -z, -y), self.maximum_tilt)
+
+    def normal(self, direction: Vector) -> Vector:
+        """Return the palm normal [device frame] that asks for a pointing direction."""
+        x, y, z = direction
+        return x, -z, -y
+
+
+def limited_tilt(direction: Vector, maximum: float) -> Vector:
+    """Return the unit vector nearest to ``direction`` that is at most ``maximum`` [rad] away from e_z."""
+    x, y, z = direction
+    lateral = math.hypot(x, y)
+    if math.atan2(lateral, z) <= maximum:
+        return direction
+    if lateral < 1e-9:  # straight down: no azimuth to keep
+        return 0.0, 0.0, 1.0
+    scale = math.sin(maximum) / lateral
+    return x * scale, y * scale, math.cos(maximum)
+
+
+def constrained_goal(mode: Mode, goal: TipGoal) -> TipGoal:
+    """Apply the constraint of a mode to a goal; G_sign in Lai et al., Eqs. (19), (20).
+
+    The printed matrices do not do what the text says (erratum GS-13); the text is followed: V-sign and
+    thumbs-up keep only the height, thumbs-up points straight. Palm and fist leave the goal as it is.
+    """
+    if mode is Mode.V_SIGN:
+        return TipGoal((0.0, 0.0, goal.position[2]), goal.direction)
+    if mode is Mode.THUMBS_UP:
+        return TipGoal((0.0, 0.0, goal.position[2]), (0.0, 0.0, 1.0))
+    return goal

@@ -1,0 +1,312 @@
+"""One step of the constrained inverse kinematics: the least squares of Lai et al., Eqs. (26), (27) and (29).
+
+Each objective is a sum of squares that is linear in the step of the actuation, so each step is a small convex
+quadratic program. It is stated twice: as the paper writes it, in cvxpy (:class:`ReadableStep`), and as the rows
+of one least-squares problem for the solver daqp (:func:`solve`). Both give the same step.
+
+Units inside this module are the paper's, because its damping lambda = 1 depends on them: millimetres for the slide
+and all positions, newtons for the cables. :class:`StepProblem` is built from SI quantities.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+import daqp
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from soro_lib.robots.cable_driven_kernels import Kinematics
+
+if TYPE_CHECKING:
+    import cvxpy
+
+Array = NDArray[np.float64]
+
+MILLIMETRE = 1e-3
+_NO_ROWS = np.zeros((0, 7))
+
+
+@dataclass(frozen=True)
+class StepWeights:
+    """Weights of the least squares, in the paper's units.
+
+    Parameters
+    ----------
+    damping : float
+        lambda of Eqs. (26), (27), (29) on the cables [mm/N].
+    slide_damping : float
+        The same on the slide [-]. The paper has none, which leaves the Hessian singular where the slide and the
+        cables can trade (erratum GS-18).
+    direction : float
+        How many millimetres of position one radian of direction is worth [mm/rad]. The paper adds mm^2 and
+        rad^2 without a weight, i.e. 1 (erratum GS-16); half the robot's length is a sensible one.
+    mid_point : float
+        Weight of the locked mid point in Eq. (27) [-].
+    locked_direction : float
+        Weight of the direction in Eq. (27) [mm/rad]; the paper has no such term (erratum GS-19).
+    avoidance : float
+        eta of Eq. (29), with the obstacle term in mm [mm^2].
+    """
+
+    damping: float = 1.0
+    slide_damping: float = 1e-2
+    direction: float = 50.0
+    mid_point: float = 1.0
+    locked_direction: float = 0.0
+    avoidance: float = 0.0
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"StepWeights.{item.name} = {value}, must be finite and >= 0")
+        if self.damping == 0 or self.slide_damping == 0:
+            raise ValueError("StepWeights.damping and slide_damping must be > 0: without them the step is not unique")
+
+
+@dataclass(frozen=True, eq=False)
+class StepProblem:
+    """Minimise |rows step - right|^2 + |weights * step|^2 within bounds; millimetres and newtons.
+
+    Attributes
+    ----------
+    rows : ndarray (m, 7)
+        Linearised residuals.
+    right : ndarray (m,)
+        What they shall become.
+    damping : ndarray (7,)
+        Weight of each actuator's own motion.
+    lower, upper : ndarray (7,)
+        Bounds of the step.
+    matrix, bound : ndarray (k, 7), (k,)
+        Inequalities ``matrix @ step <= bound``.
+    """
+
+    rows: Array
+    right: Array
+    damping: Array
+    lower: Array
+    upper: Array
+    matrix: Array = field(default_factory=lambda: _NO_ROWS)
+    bound: Array = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Result of one step.
+
+    Attributes
+    ----------
+    actuation_step : ndarray (7,)
+        Change of the actuation [m, then N]; zero when not converged.
+    converged : bool
+        Whether the solver found the optimum.
+    reason : str
+        Why not, or "".
+    """
+
+    actuation_step: Array
+    converged: bool
+    reason: str = ""
+
+
+# --- the three objectives ----------------------------------------------------------------------------------
+
+
+def pose_step(kinematics: Kinematics, position_step: Array, direction_step: Array, lower: Array, upper: Array,
+              weights: StepWeights) -> StepProblem:  # fmt: skip
+    """Follow position and direction; Lai et al., Eq. (26).
+
+    The paper's Euler angles over-constrain a pointing direction (erratum GS-16); here the direction itself
+    is followed, a linear term of the same role.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+        Of the present actuation.
+    position_step : ndarray (3,)
+        Wanted change of the tip position [m].
+    direction_step : ndarray (3,)
+        Wanted change of the pointing direction [rad].
+    lower, upper : ndarray (7,)
+        Bounds of the step of the actuation [m, then N].
+    weights : StepWeights
+        See there.
+    """
+    return _problem(
+        ((kinematics.tip_jacobian, position_step, 1 / MILLIMETRE),
+         (kinematics.direction_jacobian, direction_step, weights.direction)),
+        lower, upper, weights,
+    )  # fmt: skip
+
+
+def locked_step(kinematics: Kinematics, position_step: Array, mid_step: Array, direction_step: Array, lower: Array,
+                upper: Array, weights: StepWeights) -> StepProblem:  # fmt: skip
+    """Follow the position with the mid point held; Lai et al., Eq. (27).
+
+    Parameters are those of :func:`pose_step`, and ``mid_step``: wanted change of the mid point (3,) [m].
+    """
+    blocks = [
+        (kinematics.tip_jacobian, position_step, 1 / MILLIMETRE),
+        (kinematics.mid_jacobian, mid_step, weights.mid_point / MILLIMETRE),
+    ]
+    if weights.locked_direction > 0:
+        blocks.append((kinematics.direction_jacobian, direction_step, weights.locked_direction))
+    return _problem(blocks, lower, upper, weights)
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance:
+    """Distance of one point of the arm to an obstacle, and how it changes.
+
+    Attributes
+    ----------
+    distance : float
+        From the axis of the arm to the centre of the obstacle [m].
+    gradient : ndarray (7,)
+        Its derivative by the actuation.
+    contact : float
+        Distance at which arm and obstacle touch: R_obs + R_sr [m].
+    """
+
+    distance: float
+    gradient: Array
+    contact: float
+
+
+def avoiding_step(kinematics: Kinematics, position_step: Array, clearances: Sequence[Clearance], lower: Array,
+                  upper: Array, weights: StepWeights, margin: float | None = None) -> StepProblem:  # fmt: skip
+    """Follow the position and keep away from obstacles; Lai et al., Eq. (29), linearised.
+
+    Parameters
+    ----------
+    kinematics, position_step, lower, upper, weights
+        As in :func:`pose_step`.
+    clearances : sequence of Clearance
+        The nearest point comes first; it alone enters the cost of (29).
+    margin : float, optional
+        If given, every clearance must stay above this [m]: a linear inequality, which (29) does not have.
+    """
+    blocks = [(kinematics.tip_jacobian, position_step, 1 / MILLIMETRE)]
+    if weights.avoidance > 0 and clearances:
+        nearest = clearances[0]
+        ratio = nearest.contact / nearest.distance
+        slope = -ratio / nearest.distance * nearest.gradient
+        blocks.append((slope[None], np.array([-ratio]), math.sqrt(weights.avoidance)))
+    matrix, bound = _NO_ROWS, np.zeros(0)
+    if margin is not None and clearances:
+        matrix = np.array([-item.gradient for item in clearances]) * _column_scale(7) / MILLIMETRE
+        bound = np.array([item.distance - item.contact - margin for item in clearances]) / MILLIMETRE
+    return _problem(blocks, lower, upper, weights, matrix, bound)
+
+
+def step_bound_as_printed(actuators: int = 7) -> tuple[Array, Array]:
+    """Return A and b below Lai et al., Eq. (26), as ``A @ step <= b`` in mm and N.
+
+    The print has six entries for seven variables (erratum GS-17); the missing one is taken to be a cable's.
+    It bounds a step from above only, so it lets cables pull freely and release slowly.
+    """
+    return np.diag([1e-3] + [1.0] * (actuators - 1)), np.full(actuators, 1e-2)
+
+
+# --- solving -----------------------------------------------------------------------------------------------
+
+
+def solve(problem: StepProblem) -> Step:
+    """Solve one step with daqp.
+
+    Returns
+    -------
+    Step
+        With ``converged`` False and a zero step when the bounds contradict each other or the solver gives up.
+    """
+    hessian = problem.rows.T @ problem.rows
+    hessian.ravel()[:: len(hessian) + 1] += np.square(problem.damping)
+    gradient = -(problem.right @ problem.rows)
+    if len(problem.bound):
+        upper = np.concatenate([problem.upper, problem.bound])
+        lower = np.concatenate([problem.lower, np.full(len(problem.bound), -1e30)])
+    else:
+        upper, lower = problem.upper, problem.lower
+    if not (np.isfinite(gradient).all() and np.isfinite(hessian).all()):
+        return Step(np.zeros(len(gradient)), False, "the problem is not finite")
+    step, _, flag, _ = daqp.solve(hessian, gradient, problem.matrix, upper, lower, np.zeros(len(upper), np.intc))
+    if flag < 1:
+        reason = "the bounds contradict each other" if flag == -1 else f"daqp stopped with flag {flag}"
+        return Step(np.zeros(len(gradient)), False, reason)
+    return Step(step * _column_scale(len(step)), True)
+
+
+class ReadableStep:
+    """The same least squares as the paper writes them, in cvxpy with parameters (DPP): the reference for :func:`solve`.
+
+    Parameters
+    ----------
+    weights : StepWeights
+        See there.
+    locked : bool
+        Eq. (27) instead of Eq. (26).
+    """
+
+    def __init__(self, weights: StepWeights, locked: bool = False) -> None:
+        import cvxpy as cp
+
+        self.J, self.J_M, self.J_n = (cp.Parameter((3, 7)) for _ in range(3))
+        self.dx, self.dx_M, self.dn = (cp.Parameter(3) for _ in range(3))
+        self.lower, self.upper = cp.Parameter(7), cp.Parameter(7)
+        self.dq = cp.Variable(7)
+
+        position = cp.sum_squares(self.J @ self.dq - self.dx)
+        direction = cp.sum_squares(self.J_n @ self.dq - self.dn)
+        mid_position = cp.sum_squares(self.J_M @ self.dq - self.dx_M)
+        least_motion = cp.sum_squares(self.dq[1:])
+
+        regularisation = weights.slide_damping**2 * cp.square(self.dq[0])
+        objective = position + weights.damping**2 * least_motion + regularisation
+        if locked:
+            objective += weights.mid_point**2 * mid_position + weights.locked_direction**2 * direction
+        else:
+            objective += weights.direction**2 * direction
+        self.problem: cvxpy.Problem = cp.Problem(
+            cp.Minimize(objective), [self.lower <= self.dq, self.dq <= self.upper]
+        )
+
+    def solve(self, kinematics: Kinematics, position_step: ArrayLike, direction_step: ArrayLike, mid_step: ArrayLike,
+              lower: ArrayLike, upper: ArrayLike, **options: Any) -> Step:  # fmt: skip
+        """Solve one step; arguments as in :func:`pose_step` and :func:`locked_step`, options go to cvxpy."""
+        scale = _column_scale(7)
+        self.J.value = kinematics.tip_jacobian * scale / MILLIMETRE
+        self.J_M.value = kinematics.mid_jacobian * scale / MILLIMETRE
+        self.J_n.value = kinematics.direction_jacobian * scale
+        self.dx.value, self.dx_M.value = np.divide(position_step, MILLIMETRE), np.divide(mid_step, MILLIMETRE)
+        self.dn.value = np.asarray(direction_step, dtype=float)
+        self.lower.value, self.upper.value = np.asarray(lower) / scale, np.asarray(upper) / scale
+        self.problem.solve(**{"solver": "CLARABEL", **options})
+        if self.problem.status != "optimal" or self.dq.value is None:
+            return Step(np.zeros(7), False, f"cvxpy: {self.problem.status}")
+        return Step(self.dq.value * scale, True)
+
+
+def _problem(blocks: Sequence[tuple[Array, Array, float]], lower: Array, upper: Array, weights: StepWeights,
+             matrix: Array = _NO_ROWS, bound: Array | None = None) -> StepProblem:  # fmt: skip
+    """Stack weighted blocks (Jacobian, wanted change, weight) and change to millimetres and newtons."""
+    scale = _column_scale(len(lower))
+    rows = np.concatenate([jacobian * weight for jacobian, _, weight in blocks]) * scale
+    right = np.concatenate([wanted * weight for _, wanted, weight in blocks])
+    damping = np.full(len(lower), weights.damping)
+    damping[0] = weights.slide_damping
+    return StepProblem(rows, right, damping, lower / scale, upper / scale, matrix, np.zeros(0) if bound is None else bound)
+
+
+_SCALES: dict[int, Array] = {}
+
+
+def _column_scale(actuators: int) -> Array:
+    """Return the SI value of one unit of each actuator: a millimetre of the slide, a newton of each cable."""
+    if actuators not in _SCALES:
+        _SCALES[actuators] = np.array([MILLIMETRE] + [1.0] * (actuators - 1))
+    return _SCALES[actuators]
