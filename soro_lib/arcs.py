@@ -104,8 +104,8 @@ def chain_transform(configuration: ArrayLike) -> FloatArray:
 
     Examples
     --------
-    >>> chain_transform([[0.0, 0.0, 0.12], [0.0, 0.0, 0.24]])[2, 3]
-    0.36
+    >>> chain_transform([[0.0, 0.0, 0.12], [0.0, 0.0, 0.24]])[:3, 3]
+    array([0.  , 0.  , 0.36])
     """
     arcs = _as_configuration(configuration)
     if arcs.ndim == 2:
@@ -295,11 +295,17 @@ def _scalar_arcs(arcs: FloatArray) -> list[tuple[float, ...]]:
 
 
 def _scalar_arc(dx: float, dy: float, length: float) -> tuple[float, ...]:
-    bend = math.hypot(dx, dy)
-    if bend == 0.0:
-        return dx, dy, length, 1.0, 0.5, 1.0
-    half_sinc = math.sin(0.5 * bend) / (0.5 * bend)
-    return dx, dy, length, math.sin(bend) / bend, 0.5 * half_sinc * half_sinc, math.cos(bend)
+    half = 0.5 * math.hypot(dx, dy)
+    half_sine = math.sin(half)
+    half_sinc = half_sine / half if half > 0.0 else 1.0
+    return (
+        dx,
+        dy,
+        length,
+        half_sinc * math.cos(half),
+        0.5 * half_sinc * half_sinc,
+        1.0 - 2.0 * half_sine * half_sine,
+    )
 
 
 def _scalar_slopes(arc: Sequence[float]) -> tuple[float, float]:

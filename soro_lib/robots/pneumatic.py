@@ -89,7 +89,7 @@ class PneumaticArm(Robot):
     def configuration(self, actuation: ArrayLike) -> FloatArray:
         """Return the arc of the chamber lengths, shape (..., 1, 3) of (dx, dy, length).
 
-        Wang et al., Eqs. (19)-(21), in the form without a singularity (errata VS): with
+        Wang et al., Eqs. (19)-(21), without their singularity and folded arctangent: with
         ``v = (sqrt(3) (l2 - l3) / 2, (l2 + l3) / 2 - l1)``, (dx, dy) = 2 v / (3 d) and length = mean.
         """
         return (self.check(actuation) @ self._arc_from_lengths.T)[..., np.newaxis, :]
@@ -121,4 +121,11 @@ class PneumaticArm(Robot):
 
     @cached_property
     def _arc_from_lengths(self) -> FloatArray:
-        return np.linalg.inv(self._lengths_from_arc).astype(np.float64)
+        bend = 2.0 / (3.0 * self.chamber_distance)
+        return np.array(
+            [
+                [0.0, bend * np.sqrt(0.75), -bend * np.sqrt(0.75)],
+                [-bend, 0.5 * bend, 0.5 * bend],
+                [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
+            ]
+        )
