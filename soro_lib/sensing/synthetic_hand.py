@@ -331,6 +331,7 @@ def _with_losses(rng: np.random.Generator, table: pd.DataFrame, noise: HandNoise
     table["hand_id"] = table["hand_id"].astype("Int64")
     hand = [column for column in table.columns if column not in ("timestamp_us", "frame_id")]
     table[hand[2:]] = table[hand[2:]].astype(float)
+    unseen = np.zeros(len(time), dtype=bool)
     for instant in np.sort(rng.uniform(0.5, time[-1], rng.poisson(noise.losses * time[-1]))):
         lasting = 0.055 if rng.random() < 0.7 else rng.uniform(0.4, 1.2)
         lost, after = (time >= instant) & (time < instant + lasting), time >= instant + lasting
@@ -338,5 +339,6 @@ def _with_losses(rng: np.random.Generator, table: pd.DataFrame, noise: HandNoise
         table.loc[after, "hand_type"] = "left" if rng.random() < 0.2 else "right"
         jump = _direction(rng) * (10.0 if lasting < 0.1 else 60.0) * np.exp(-(time[after] - instant) / 1.0)[:, None]
         table.loc[after, list(PALM)] += jump
-        table.loc[lost, hand] = pd.NA
+        unseen |= lost
+    table.loc[unseen, hand] = pd.NA
     return table
