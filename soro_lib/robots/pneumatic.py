@@ -92,12 +92,18 @@ class PneumaticArm(Robot):
         Wang et al., Eqs. (19)-(21), without their singularity and folded arctangent: with
         ``v = (sqrt(3) (l2 - l3) / 2, (l2 + l3) / 2 - l1)``, (dx, dy) = 2 v / (3 d) and length = mean.
         """
-        return (self.check(actuation) @ self._arc_from_lengths.T)[..., np.newaxis, :]
+        first, second, third = np.moveaxis(self.check(actuation), -1, 0)
+        bend = 2.0 / (3.0 * self.chamber_distance)
+        dx = bend * np.sqrt(0.75) * (second - third)
+        dy = bend * (0.5 * (second + third) - first)
+        return np.stack([dx, dy, (first + second + third) / 3.0], axis=-1)[..., np.newaxis, :]
 
     def configuration_jacobian(self, actuation: ArrayLike) -> FloatArray:
         """Return d configuration / d actuation, shape (..., 3, 3): the same everywhere."""
         batch_shape = self.check(actuation).shape[:-1]
-        return np.broadcast_to(self._arc_from_lengths, (*batch_shape, 3, 3))
+        bend, root = 2.0 / (3.0 * self.chamber_distance), np.sqrt(0.75)
+        slopes = [[0.0, bend * root, -bend * root], [-bend, 0.5 * bend, 0.5 * bend], [1.0 / 3.0] * 3]
+        return np.broadcast_to(slopes, (*batch_shape, 3, 3))
 
     def displacement(self, actuation: ArrayLike) -> FloatArray:
         """Return the tip position relative to the tip at rest [m], shape (..., 3), as in Section II-A."""
@@ -108,24 +114,10 @@ class PneumaticArm(Robot):
         arcs = np.asarray(configuration, dtype=float)
         if arcs.shape[-2:] != (1, 3):
             raise ValueError(f"configuration must have shape (..., 1, 3), got {arcs.shape}")
-        lengths: FloatArray = require_finite(arcs[..., 0, :], "configuration") @ self._lengths_from_arc.T
+        routing = routing_matrix(self.chamber_distance, CHAMBER_ANGLES)
+        lengths: FloatArray = require_finite(arcs[..., 0, :], "configuration") @ routing.T
         return lengths
 
     def motor_commands(self, actuation: ArrayLike) -> FloatArray:
         """Return the motor commands ``alpha (lengths - rest)``, shape (..., 3): Wang et al., Eq. (27)."""
         return np.asarray(self.motor_gains) * (self.check(actuation) - self.home)
-
-    @cached_property
-    def _lengths_from_arc(self) -> FloatArray:
-        return routing_matrix(self.chamber_distance, CHAMBER_ANGLES)
-
-    @cached_property
-    def _arc_from_lengths(self) -> FloatArray:
-        bend = 2.0 / (3.0 * self.chamber_distance)
-        return np.array(
-            [
-                [0.0, bend * np.sqrt(0.75), -bend * np.sqrt(0.75)],
-                [-bend, 0.5 * bend, 0.5 * bend],
-                [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
-            ]
-        )
