@@ -4,6 +4,7 @@ The environment is finished when .venv/complete holds the digest of what it was 
 a changed lock to an interrupted installation, is made anew.
 """
 
+import fcntl
 import hashlib
 import json
 import shutil
@@ -22,8 +23,6 @@ def main() -> None:
     wanted = digest()
     if COMPLETE.is_file() and COMPLETE.read_text() == wanted and works():
         return
-    import fcntl
-
     (ROOT / "build").mkdir(exist_ok=True)
     with open(ROOT / "build" / "environment.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -52,8 +51,8 @@ def create() -> None:
         import venv
     except ImportError:
         sys.exit(
-            f"error: this Python {version} comes without venv and ensurepip; on Debian and Ubuntu install\n"
-            f"python{sys.version_info.major}.{sys.version_info.minor}-venv, or name another one: make PYTHON=..."
+            f"error: this Python {version} comes without venv and ensurepip; on Debian and Ubuntu install "
+            f"python3.{sys.version_info.minor}-venv,\nor name another one: make PYTHON=..."
         )
     shutil.rmtree(VENV, ignore_errors=True)
     venv.create(VENV, with_pip=True, symlinks=True)

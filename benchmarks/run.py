@@ -13,6 +13,7 @@ import re
 import subprocess
 import sys
 import timeit
+import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -23,7 +24,6 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "
     os.environ.setdefault(variable, "1")
 
 ROOT = Path(__file__).resolve().parent.parent
-PEERS = ("soromox>=0.5", "pytransform3d>=3.14")
 NOT_INSTALLED = "peer not installed"
 
 
@@ -97,7 +97,8 @@ def install_peers() -> None:
     pins = re.findall(r"^[A-Za-z0-9_.-]+==[^\\\n]+", (ROOT / "environment.txt").read_text(), re.MULTILINE)
     constraints.write_text("\n".join(pins) + "\n")
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    for peer in PEERS:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    for peer in project["optional-dependencies"]["bench"]:
         if subprocess.run([*pip, "--constraint", str(constraints), peer], check=False).returncode:
             print(f"{peer} could not be installed; its rows stay empty", file=sys.stderr)
 

@@ -109,7 +109,8 @@ class Execution:
         """Count the notebook's own code cells as they start."""
         if self.interrupted:
             self.kill()
-        if "injected-parameters" not in cell.metadata.get("tags", []):
+        injected = "injected-parameters" in cell.metadata.get("tags", [])
+        if cell.cell_type == "code" and cell.source.strip() and not injected:
             self.cell += 1
             self.on_cell(self.cell)
 
