@@ -129,8 +129,8 @@ class AssistAsNeeded:
     sample_rate : float
         [Hz].
     counter : {"text", "caption"}
-        Reading of the counter tau. "text" resets it whenever the state changes, "caption" lets it run on between
-        steady and away, as Fig. 5's caption and the authors' program have it.
+        Reading of the counter tau. "text" resets it whenever the state changes, "caption" not between
+        steady and away, as Fig. 5 and the authors' program have it.
     unit_direction : bool
         True: the printed law. False: the authors' program, direction not normalised (Erratum SC-9).
 

@@ -1,0 +1,400 @@
+"""How the tip of the soft-growing arm follows its command, simulated and real, and how its gripper holds.
+
+The simulated tip is that of the authors' program: a first-order lag per axis. The real one runs the
+closed loop of the supplement (steering and eversion apart) on a body with stated imperfections. Like the
+control rules, these are functions of plain numbers that the simulator compiles and `SoftGrowingPlant` calls.
+
+Source: Stroppa et al., Sections 3.1, 3.2 and supplement, Sections 4 and 5.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import ArrayLike, NDArray
+
+Vector = tuple[float, float, float]
+
+SAMPLE_TIME = 0.01
+"""Period of the control loop [s] (Stroppa et al., Table 3: 100 Hz)."""
+
+REFERENCE_LENGTH = 0.65
+"""Length at which the gains and lags of the real arm are stated [m]: tip at the items."""
+
+
+class PlantRule(NamedTuple):
+    """`PlantParameters` as plain numbers, with the command delay in samples."""
+
+    real: bool
+    tip_lag: float
+    command_delay: int
+    steering_gain: float
+    steering_damping: float
+    steering_lag: float
+    cable_friction: float
+    eversion_gain: float
+    feed_forward: float
+    passive_growth: float
+    eversion_lag: float
+    maximum_speed: float
+    maximum_tilt: float
+    minimum_length: float
+    maximum_length: float
+    floor: float
+    tracking_noise: float
+
+
+@dataclass(frozen=True)
+class PlantParameters:
+    """The arm from command to tip. The defaults are the simulator's; `real_arm` gives the real variant.
+
+    Parameters
+    ----------
+    real : bool
+        Whether the closed loop of the supplement drives an imperfect body; else the tip is a first-order lag.
+    tip_lag : float
+        Time constant of the simulated tip [s]; the program closes 1 % of the gap per 10 ms.
+    command_delay : float
+        From the hand to the arm and back to the eye [s].
+    steering_gain, steering_damping : float
+        Proportional [1/s] and derivative [-] gain of the steering, both scaled with the length.
+    steering_lag : float
+        Lag of the bending body at the reference length [s]; it grows in proportion to the length.
+    cable_friction : float
+        Steering error that the cables' Coulomb friction swallows at the reference length [rad].
+    eversion_gain : float
+        Proportional gain of the growth [1/s].
+    feed_forward, passive_growth : float
+        Retraction commanded against, and growth caused by, the pressure [m/s].
+    eversion_lag : float
+        Lag of the growth at the reference length [s]; the tail's friction grows with the length.
+    maximum_speed : float
+        Of the tip, along and across the body each [m/s].
+    maximum_tilt : float
+        Largest angle between body and vertical [rad].
+    minimum_length, maximum_length : float
+        Of the body [m].
+    floor : float
+        Height z at which the table stops the tip [m]; the simulator has none.
+    tracking_noise : float
+        Standard deviation of the tracked tip per axis and 10 ms sample [m].
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of bounds; the message names it.
+    """
+
+    real: bool = False
+    tip_lag: float = 0.99 / 0.01 * SAMPLE_TIME
+    command_delay: float = 0.0
+    steering_gain: float = 1.4
+    steering_damping: float = 0.1
+    steering_lag: float = 0.3
+    cable_friction: float = 0.012
+    eversion_gain: float = 1.4
+    feed_forward: float = 0.016
+    passive_growth: float = 0.020
+    eversion_lag: float = 0.2
+    maximum_speed: float = 0.2
+    maximum_tilt: float = 1.1
+    minimum_length: float = 0.1
+    maximum_length: float = 1.5
+    floor: float = math.inf
+    tracking_noise: float = 0.0
+
+    def __post_init__(self) -> None:
+        may_be_zero = {
+            "command_delay",
+            "steering_damping",
+            "cable_friction",
+            "feed_forward",
+            "passive_growth",
+        }
+        may_be_zero |= {"tracking_noise"}
+        for name in (field.name for field in fields(self) if field.name != "real"):
+            value = getattr(self, name)
+            if math.isnan(value) or value < 0 or (value == 0 and name not in may_be_zero):
+                bound = "not below 0" if name in may_be_zero else "above 0"
+                raise ValueError(f"{name} must be {bound}, got {value!r}")
+        if self.maximum_tilt >= math.pi / 2:
+            raise ValueError(f"maximum_tilt must be below pi/2, got {self.maximum_tilt!r}")
+        if self.minimum_length >= self.maximum_length:
+            raise ValueError(
+                f"minimum_length must be below maximum_length = {self.maximum_length} m, "
+                f"got {self.minimum_length}"
+            )
+
+    def rule(self) -> PlantRule:
+        """Plain numbers for the compiled rules."""
+        values: dict[str, Any] = {field.name: float(getattr(self, field.name)) for field in fields(self)}
+        values["real"] = bool(self.real)
+        values["command_delay"] = round(self.command_delay / SAMPLE_TIME)
+        return PlantRule(**values)
+
+
+def real_arm(tracking_noise: float | None = None) -> PlantParameters:
+    """The real variant, its imperfections stated one by one.
+
+    Commands and video take 0.15 s; the bending body lags by 0.3 s and the growth by 0.2 s at 0.65 m, in
+    proportion to the length; cable friction swallows 8 mm at the tip, for which the controller has no
+    integral term; the feed-forward counters 80 % of the growth by pressure; a table stands 25 mm below the
+    centres of the items. The tracker is taken to see a marker within 0.1 mm per frame; the centroid of 8
+    markers, averaged over the 2.7 frames of a control period (270 Hz to 100 Hz), leaves 0.02 mm.
+    """
+    centroid = 1e-4 / math.sqrt(8 * 2.7) if tracking_noise is None else tracking_noise
+    return PlantParameters(real=True, command_delay=0.15, floor=0.67, tracking_noise=centroid)
+
+
+class PlantState(NamedTuple):
+    """Tip [m]; steering direction, its rate [1/s] and last error; length [m] and growth rate [m/s]."""
+
+    tip: Vector
+    direction_x: float
+    direction_y: float
+    rate_x: float
+    rate_y: float
+    error_x: float
+    error_y: float
+    length: float
+    growth: float
+    sample: int
+
+
+def plant_start(tip: Vector) -> PlantState:
+    """The arm at rest with its tip at a point below the base."""
+    length = math.hypot(*tip)
+    return PlantState(tip, tip[0] / length, tip[1] / length, 0.0, 0.0, 0.0, 0.0, length, 0.0, 0)
+
+
+@register_jitable
+def simulated_tip(tip: Vector, desired: Vector, lag: float) -> Vector:
+    """One period of the simulator's first-order tip, exact for the authors' step of 1 % per 10 ms."""
+    share = SAMPLE_TIME / (lag + SAMPLE_TIME)
+    return (
+        tip[0] + share * (desired[0] - tip[0]),
+        tip[1] + share * (desired[1] - tip[1]),
+        tip[2] + share * (desired[2] - tip[2]),
+    )
+
+
+@register_jitable
+def eversion_command(gain: float, feed_forward: float, length_error: float) -> float:
+    """Commanded growth rate [m/s]: proportional, less what counters the passive growth (supplement, 5)."""
+    return gain * length_error - feed_forward
+
+
+@register_jitable
+def steering_command(gain: float, damping: float, length: float, error: float, error_rate: float) -> float:
+    """Commanded steering rate [1/s]: proportional-derivative, gains scaled with the length (supplement, 5)."""
+    return length / REFERENCE_LENGTH * (gain * error + damping * error_rate)
+
+
+@register_jitable
+def limited(x: float, y: float, bound: float) -> tuple[float, float]:
+    """The vector (x, y), shortened to the bound where it is longer."""
+    size = math.sqrt(x * x + y * y)
+    scale = bound / size if size > bound else 1.0
+    return scale * x, scale * y
+
+
+@register_jitable
+def after_friction(x: float, y: float, friction: float) -> tuple[float, float]:
+    """What Coulomb friction leaves of the command (x, y): nothing below it, the excess above."""
+    size = math.sqrt(x * x + y * y)
+    scale = 1.0 - friction / size if size > friction else 0.0
+    return scale * x, scale * y
+
+
+@register_jitable
+def real_tip(rule: PlantRule, state: PlantState, desired: Vector) -> PlantState:
+    """One period of the real arm: steer toward the proxy, evert the rest (supplement, Sections 4 and 5).
+
+    The steering error is that of the proxy p = d L_a / L_d of Eqs. (6), (7) against the tip, divided by
+    L_a, in the plane: the angle for small errors. The motors are left out: Eq. (1) maps their commands back
+    to this plane without loss.
+    """
+    wanted = max(math.sqrt(desired[0] ** 2 + desired[1] ** 2 + desired[2] ** 2), rule.minimum_length)
+    tilt_bound = math.sin(rule.maximum_tilt)
+    aim_x, aim_y = limited(desired[0] / wanted, desired[1] / wanted, tilt_bound)
+    error_x, error_y = aim_x - state.direction_x, aim_y - state.direction_y
+    last_x = state.error_x if state.sample > 0 else error_x
+    last_y = state.error_y if state.sample > 0 else error_y
+    length, gain, damping = state.length, rule.steering_gain, rule.steering_damping
+    command_x = steering_command(gain, damping, length, error_x, (error_x - last_x) / SAMPLE_TIME)
+    command_y = steering_command(gain, damping, length, error_y, (error_y - last_y) / SAMPLE_TIME)
+    command_x, command_y = after_friction(command_x, command_y, gain * rule.cable_friction)
+
+    scale = length / REFERENCE_LENGTH
+    share = SAMPLE_TIME / (rule.steering_lag * scale + SAMPLE_TIME)
+    rate_x = state.rate_x + share * (command_x / scale - state.rate_x)
+    rate_y = state.rate_y + share * (command_y / scale - state.rate_y)
+    rate_x, rate_y = limited(rate_x, rate_y, rule.maximum_speed / length)
+    x, y = limited(
+        state.direction_x + SAMPLE_TIME * rate_x, state.direction_y + SAMPLE_TIME * rate_y, tilt_bound
+    )
+
+    growth_command = eversion_command(rule.eversion_gain, rule.feed_forward, wanted - length)
+    share = SAMPLE_TIME / (rule.eversion_lag * scale + SAMPLE_TIME)
+    growth = state.growth + share * (growth_command + rule.passive_growth - state.growth)
+    growth = min(max(growth, -rule.maximum_speed), rule.maximum_speed)
+    down = math.sqrt(1.0 - x * x - y * y)
+    longest = min(rule.maximum_length, rule.floor / down)
+    length = min(max(length + SAMPLE_TIME * growth, rule.minimum_length), longest)
+    tip = (length * x, length * y, length * down)
+    return PlantState(tip, x, y, rate_x, rate_y, error_x, error_y, length, growth, state.sample + 1)
+
+
+@register_jitable
+def plant_step(
+    rule: PlantRule, state: PlantState, delayed: NDArray[np.float64], desired: Vector
+) -> PlantState:
+    """One period of the arm; ``delayed`` (n, 3) is the ring buffer of commands on their way."""
+    if not rule.real:
+        tip = simulated_tip(state.tip, desired, rule.tip_lag)
+        return PlantState(tip, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, state.sample + 1)
+    place = state.sample % len(delayed)
+    arriving = (delayed[place, 0], delayed[place, 1], delayed[place, 2])
+    for axis in range(3):
+        delayed[place, axis] = desired[axis]
+    return real_tip(rule, state, arriving)
+
+
+@register_jitable
+def tracked_tip(tip: Vector, noise: float, rng: np.random.Generator) -> Vector:
+    """The tip as motion capture reports it (Stroppa et al., Section 3.3.1)."""
+    if noise == 0.0:
+        return tip
+    return (
+        tip[0] + noise * rng.standard_normal(),
+        tip[1] + noise * rng.standard_normal(),
+        tip[2] + noise * rng.standard_normal(),
+    )
+
+
+def command_buffer(rule: PlantRule, tip: Vector) -> NDArray[np.float64]:
+    """Ring buffer of the commands on their way, filled with the position of rest."""
+    return np.tile(np.asarray(tip, dtype=float), (max(rule.command_delay, 1), 1))
+
+
+class SoftGrowingPlant:
+    """The arm, one command after the other.
+
+    Parameters
+    ----------
+    parameters : PlantParameters
+        `PlantParameters()` for the simulator's arm, `real_arm()` for the real variant.
+    tip : array_like
+        (3,) position at rest, base frame [m], z down.
+
+    Raises
+    ------
+    ValueError
+        If the start is not three finite numbers below the base.
+
+    Examples
+    --------
+    >>> plant = SoftGrowingPlant(PlantParameters(), (0.0, 0.0, 0.1))
+    >>> float(plant.step((0.0, 0.0, 0.6))[2].round(4))
+    0.105
+    """
+
+    def __init__(self, parameters: PlantParameters, tip: ArrayLike = (0.0, 0.0, 0.1)) -> None:
+        start = finite_point("tip", tip)
+        if start[2] <= 0:
+            raise ValueError(f"tip must hang below the base (z > 0), got z = {start[2]} m")
+        self.rule = parameters.rule()
+        self.state = plant_start(start)
+        self.delayed = command_buffer(self.rule, start)
+
+    def step(self, desired: ArrayLike) -> NDArray[np.float64]:
+        """Command a position (3,) [m] for one period and return the tip (3,) [m] after it.
+
+        Raises
+        ------
+        ValueError
+            If the command is not three finite numbers.
+        """
+        self.state = plant_step(self.rule, self.state, self.delayed, finite_point("desired", desired))
+        return np.array(self.state.tip)
+
+
+def finite_point(name: str, value: ArrayLike) -> Vector:
+    """Three finite numbers, or a ValueError that names the argument."""
+    array = np.asarray(value, dtype=float)
+    if array.shape != (3,) or not np.all(np.isfinite(array)):
+        raise ValueError(f"{name} must be three finite numbers, got {array.tolist()}")
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+# --- The soft magnetic gripper: Section 3.1, Fig. 3 ---------------------------------------------------------
+
+
+class GripperRule(NamedTuple):
+    """Range of the magnet [m], whether it is measured from the command, and delay of the release [s].
+
+    The simulator attaches an item when the *commanded* tip comes near and lets go at once. The real magnet
+    acts at the tip, and the inflated gripper lets go after ``shortest`` plus an exponential time of mean
+    ``mean_extra``.
+    """
+
+    reach: float
+    from_command: bool
+    shortest: float
+    mean_extra: float
+
+
+SIMULATED_GRIPPER = GripperRule(reach=0.05, from_command=True, shortest=0.0, mean_extra=0.0)
+REAL_GRIPPER = GripperRule(reach=0.045, from_command=False, shortest=0.2, mean_extra=0.3)
+NOTHING = -1
+
+
+class GripperState(NamedTuple):
+    """Item held (-1: none) and time until a release takes effect [s] (negative: none under way)."""
+
+    item: int
+    letting_go: float
+
+
+@register_jitable
+def nearest_item(items: NDArray[np.float64], point: Vector) -> tuple[int, float]:
+    """Number of the nearest item and its distance [m]."""
+    best, least = NOTHING, math.inf
+    for index in range(len(items)):
+        x, y, z = items[index, 0] - point[0], items[index, 1] - point[1], items[index, 2] - point[2]
+        distance = math.sqrt(x * x + y * y + z * z)
+        if distance < least:
+            best, least = index, distance
+    return best, least
+
+
+@register_jitable
+def gripper_step(
+    rule: GripperRule,
+    state: GripperState,
+    items: NDArray[np.float64],
+    tip: Vector,
+    desired: Vector,
+    closed: bool,
+    rng: np.random.Generator,
+) -> GripperState:
+    """One period of the gripper: attract, carry, or let go (Stroppa et al., Section 3.1)."""
+    if state.item == NOTHING:
+        if closed:
+            item, distance = nearest_item(items, desired if rule.from_command else tip)
+            if distance < rule.reach:
+                return GripperState(item, -1.0)
+        return state
+    if closed:
+        return GripperState(state.item, -1.0)
+    waiting = state.letting_go
+    if waiting < 0.0:
+        waiting = rule.shortest
+        if rule.mean_extra > 0.0:
+            waiting += rng.exponential(rule.mean_extra)
+    if waiting <= SAMPLE_TIME / 2:
+        return GripperState(NOTHING, -1.0)
+    return GripperState(state.item, waiting - SAMPLE_TIME)
