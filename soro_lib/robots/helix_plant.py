@@ -1,0 +1,459 @@
+"""Two simulated Helix arms that sag, the motors that pull their tendons, and the gripper.
+
+The thesis has the device; the simulation needs a plant whose true shape is not the commanded one. Two are
+offered, so that a claim can be checked on both:
+
+- plant K, :class:`AngleLossPlant`: the segments realise part of the commanded bending angle; smooth and
+simple.
+- plant E, :class:`ElasticPlant`: the shape of least energy under gravity, with tendons that stretch and only
+pull.
+
+Both take tendon lengths (m, nine) and return the true state q (9,). A hand may hold the gripper like a
+spring.
+"""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from soro_lib.robots.helix import HelixArm
+from soro_lib.robots.helix_kernels import (
+    cholesky,
+    cholesky_solve,
+    depth_moment,
+    multiply,
+    tip_points_and_jacobian,
+)
+
+GRAVITY = 9.81
+"""Acceleration of free fall [m/s^2]."""
+
+LUMPS = 3
+"""Equal masses that stand for each segment's weight."""
+
+LONGEST_NEWTON_STEP = 0.15
+"""Longest Newton step, in rad and 0.1 m; longer ones jump to folded shapes."""
+
+EQUILIBRIUM_TOLERANCE = 1e-9
+"""Newton step below which the shape is at rest, in rad and 0.1 m."""
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A hand that holds the gripper like a spring.
+
+    Attributes
+    ----------
+    point : tuple of 3 float
+        Where the hand wants the gripper [m], frame `arm_base`.
+    stiffness : float
+        Of the grip [N/m].
+    """
+
+    point: tuple[float, float, float]
+    stiffness: float = 200.0
+
+
+class HelixPlant(Protocol):
+    """What a simulated arm offers to a study."""
+
+    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
+        """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m]."""
+        ...
+
+    def reset(self) -> None:
+        """Forget where the arm is."""
+        ...
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """How an arm resists bending and stretching.
+
+    Attributes
+    ----------
+    bending : float
+        ``EI`` [N m^2].
+    axial : float
+        ``EA`` [N].
+    """
+
+    bending: float = 0.040
+    axial: float = 80.0
+
+    def __post_init__(self) -> None:
+        for name in ("bending", "axial"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+
+    def diagonal(self, arm: HelixArm) -> NDArray[np.float64]:
+        """Return the stiffness of each coordinate of q (9,): Nm/rad for angles, N/m for lengths."""
+        lengths = np.asarray(arm.rest_lengths)
+        return np.stack(
+            [self.bending / lengths, self.bending / lengths, self.axial / lengths], axis=-1
+        ).ravel()
+
+
+@dataclass
+class AngleLossPlant:
+    """Plant K: every segment realises a fixed share of its commanded bending angle, and its length in full.
+
+    Gravity straightens a hanging arm; that is all this plant knows of it. The shares have no printed value:
+    `soro_lib.calibrations.soft_handover` fits them to three numbers of the thesis.
+
+    Parameters
+    ----------
+    realised : tuple of 3 float
+        Share of the bending angle that segments 1 to 3 realise, in (0, 1].
+    arm : HelixArm
+    play : float
+        Half width of the backlash of each bending angle [rad].
+    stiffness : Stiffness
+        Against the pull of a hand.
+    """
+
+    realised: tuple[float, float, float]
+    arm: HelixArm = field(default_factory=HelixArm)
+    play: float = 0.0
+    stiffness: Stiffness = field(default_factory=Stiffness)
+
+    def __post_init__(self) -> None:
+        if len(self.realised) != 3 or not all(0 < share <= 1 for share in self.realised):
+            raise ValueError(f"realised must be three shares in (0, 1], got {self.realised}")
+        if not self.play >= 0:
+            raise ValueError(f"play must be at least 0 rad, got {self.play}")
+        self._shares = np.stack([self.realised, self.realised, np.ones(3)], axis=-1).ravel()
+        self.reset()
+
+    def reset(self) -> None:
+        """Put the arm back to its calibrated state."""
+        self._free = self.arm.home.copy()
+
+    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
+        """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m].
+
+        Without play the state depends on the command alone. A hand moves it to the least energy of arm and
+        grip.
+        """
+        target = self._shares * self.arm.state_from_tendons(tendon_lengths)
+        slack = self.play * (self._shares < 1)
+        self._free = np.clip(self._free, target - slack, target + slack)
+        if hand is None:
+            return self._free.copy()
+        return held_state(
+            self._free,
+            self.stiffness.diagonal(self.arm),
+            np.array(hand.point),
+            hand.stiffness,
+            self.arm.gripper_length,
+        )
+
+
+@njit(cache=True)
+def held_state(free, stiffness, point, grip, gripper_length):
+    """Return the state of least ``(q - free)' K (q - free) + grip |gripper(q) - point|^2``, by
+    Gauss-Newton."""
+    q = free.copy()
+    for _ in range(50):
+        points, jacobian = tip_points_and_jacobian(q, gripper_length)
+        pull = jacobian[3:]
+        gradient = stiffness * (q - free) + grip * multiply(pull.T, points[3:] - point)
+        hessian = np.diag(stiffness) + grip * pull.T @ pull
+        step = -cholesky_solve(cholesky(hessian), gradient)
+        q = q + min(1.0, LONGEST_NEWTON_STEP / np.abs(step).max()) * step
+        if np.abs(step).max() < EQUILIBRIUM_TOLERANCE:
+            break
+    return q
+
+
+@dataclass
+class ElasticPlant:
+    """Plant E: the shape of least energy of an elastic arm under gravity whose tendons stretch and only pull.
+
+    Energy: gravity of three lumps per segment and of the gripper, bending ``EI D^2 / (2 L0)``, axial
+    ``EA (l - f L0)^2 / (2 L0)`` with a free length f L0 above the rest length (so the tendons are
+    pretensioned), and ``k max(0, g(q) - l)^2 / 2`` for every tendon of commanded length l. A slack tendon
+    does nothing; that is the mechanism the thesis names (Section 3.3.1). The values are a choice, not
+    measurements of the device.
+
+    Parameters
+    ----------
+    arm : HelixArm
+    stiffness : Stiffness
+    tendon_stiffness : float
+        Of each tendon with its Bowden cable [N/m].
+    free_length : float
+        Length of an unloaded segment over its calibrated length [-].
+    linear_density : float
+        Mass of the arm [kg/m].
+    gripper_mass, gripper_mass_distance : float
+        Gripper as a lump [kg] past the wrist [m].
+    play : float
+        Half width of the backlash of each tendon [m].
+    """
+
+    arm: HelixArm = field(default_factory=HelixArm)
+    stiffness: Stiffness = field(default_factory=Stiffness)
+    tendon_stiffness: float = 2000.0
+    free_length: float = 1.20
+    linear_density: float = 0.35
+    gripper_mass: float = 0.25
+    gripper_mass_distance: float = 0.05
+    play: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("tendon_stiffness", "free_length", "linear_density"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        for name in ("gripper_mass", "gripper_mass_distance", "play"):
+            if not getattr(self, name) >= 0:
+                raise ValueError(f"{name} must be at least 0, got {getattr(self, name)}")
+        self._tendon_map = np.ascontiguousarray(self.arm.tendon_lengths(np.eye(9)).T)
+        self.reset()
+
+    def reset(self) -> None:
+        """Start the next search from the calibrated state."""
+        self._state = self.arm.home.copy()
+        self._realised = self.arm.tendon_lengths(self.arm.home)
+
+    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
+        """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m].
+
+        The search starts from the last state, as the arm does.
+
+        Raises
+        ------
+        RuntimeError
+            If the search for the equilibrium does not come to rest.
+        """
+        command = np.asarray(tendon_lengths, dtype=float)
+        self._realised = np.clip(self._realised, command - self.play, command + self.play)
+        lengths = np.asarray(self.arm.rest_lengths)
+        free = np.stack([np.zeros(3), np.zeros(3), self.free_length * lengths], axis=-1).ravel()
+        state, at_rest = equilibrium(
+            self._state,
+            self._realised,
+            self._tendon_map,
+            self.tendon_stiffness,
+            self.stiffness.diagonal(self.arm),
+            free,
+            self.linear_density * lengths,
+            self.gripper_mass,
+            self.gripper_mass_distance,
+            np.array(hand.point) if hand else np.zeros(3),
+            hand.stiffness if hand else 0.0,
+            self.arm.gripper_length,
+        )
+        if not at_rest:
+            raise RuntimeError("the elastic arm found no equilibrium for these tendon lengths")
+        self._state = state
+        return state.copy()
+
+
+@njit(cache=True)
+def equilibrium(
+    q,
+    tendons,
+    tendon_map,
+    tendon_stiffness,
+    stiffness,
+    free,
+    masses,
+    tip_mass,
+    tip_distance,
+    point,
+    grip,
+    gripper_length,
+):
+    """Return the state of least energy near q and whether the search came to rest (damped Newton)."""
+    scale = np.array([1.0, 1.0, 0.1] * 3)
+    for _ in range(200):
+        gradient, hessian = energy_slopes(
+            q,
+            tendons,
+            tendon_map,
+            tendon_stiffness,
+            stiffness,
+            free,
+            masses,
+            tip_mass,
+            tip_distance,
+            point,
+            grip,
+            gripper_length,
+        )
+        scaled_hessian = hessian * np.outer(scale, scale)
+        shift = 0.0
+        factor = cholesky(scaled_hessian)
+        while np.isnan(factor[0, 0]):
+            shift = max(2 * shift, 1e-3 * np.abs(np.diag(scaled_hessian)).max())
+            factor = cholesky(scaled_hessian + shift * np.eye(9))
+        step = -cholesky_solve(factor, scale * gradient)
+        length = np.sqrt((step**2).sum())
+        q = q + min(1.0, LONGEST_NEWTON_STEP / length) * scale * step
+        if length < EQUILIBRIUM_TOLERANCE:
+            return q, True
+    return q, False
+
+
+@njit(cache=True)
+def energy_slopes(
+    q,
+    tendons,
+    tendon_map,
+    tendon_stiffness,
+    stiffness,
+    free,
+    masses,
+    tip_mass,
+    tip_distance,
+    point,
+    grip,
+    gripper_length,
+):
+    """Return gradient (9,) and Hessian (9, 9) of the energy; gravity's curvature by differences."""
+    gradient = stiffness * (q - free)
+    hessian = np.diag(stiffness)
+    stretch = multiply(tendon_map, q) - tendons
+    for k in range(9):
+        if stretch[k] > 0:
+            gradient += tendon_stiffness * stretch[k] * tendon_map[k]
+            hessian += tendon_stiffness * np.outer(tendon_map[k], tendon_map[k])
+    fall = depth_moment(q, masses, LUMPS, tip_mass, tip_distance)[1]
+    gradient -= GRAVITY * fall
+    for j in range(9):
+        nudge = np.zeros(9)
+        nudge[j] = 1e-7
+        ahead = depth_moment(q + nudge, masses, LUMPS, tip_mass, tip_distance)[1]
+        hessian[:, j] -= GRAVITY * (ahead - fall) / nudge[j]
+    if grip > 0:
+        points, jacobian = tip_points_and_jacobian(q, gripper_length)
+        gradient += grip * multiply(jacobian[3:].T, points[3:] - point)
+        hessian += grip * jacobian[3:].T @ jacobian[3:]
+    return gradient, 0.5 * (hessian + hessian.T)
+
+
+@dataclass
+class LaggingPlant:
+    """A plant that needs time: each step it covers the share ``1 - exp(-timestep / time_constant)`` of its
+    way.
+
+    Parameters
+    ----------
+    plant : HelixPlant
+        Where the arm would come to rest.
+    timestep, time_constant : float
+        Of the loop and of the arm [s].
+    """
+
+    plant: HelixPlant
+    timestep: float
+    time_constant: float
+
+    def __post_init__(self) -> None:
+        for name in ("timestep", "time_constant"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        self._state: NDArray[np.float64] | None = None
+
+    def reset(self) -> None:
+        """Forget where the arm is; the next call finds it at rest."""
+        self.plant.reset()
+        self._state = None
+
+    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
+        """Return the true state q (9,) one timestep later."""
+        rest = self.plant.settle(tendon_lengths, hand)
+        left = np.exp(-self.timestep / self.time_constant)
+        self._state = rest if self._state is None else rest + left * (self._state - rest)
+        return self._state.copy()
+
+
+@dataclass(frozen=True)
+class TendonMotors:
+    """The nine motors: a range per tendon and the tick of their encoders (public software of the arm).
+
+    Parameters
+    ----------
+    arm : HelixArm
+        Its pulleys and motor orientations.
+    shortest, longest : tuple of 9 float
+        Range of the tendon change from calibration [m].
+    ticks_per_turn : int
+    """
+
+    arm: HelixArm = field(default_factory=HelixArm)
+    shortest: tuple[float, ...] = (-0.1,) * 3 + (-0.2,) * 6
+    longest: tuple[float, ...] = (0.1,) * 9
+    ticks_per_turn: int = 4096
+
+    def __post_init__(self) -> None:
+        if (
+            len(self.shortest) != 9
+            or len(self.longest) != 9
+            or not np.all(np.less(self.shortest, self.longest))
+        ):
+            raise ValueError(f"shortest and longest must be nine pairs, got {self.shortest}, {self.longest}")
+        if self.ticks_per_turn < 1:
+            raise ValueError(f"ticks_per_turn must be at least 1, got {self.ticks_per_turn}")
+
+    def clip(self, tendon_change: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return the change (9,) [m] within the motors' range, and which tendons were cut short.
+
+        Raises
+        ------
+        ValueError
+            If a change is not finite.
+        """
+        change = np.asarray(tendon_change, dtype=float)
+        if change.shape != (9,) or not np.isfinite(change).all():
+            raise ValueError(f"tendon_change must be nine finite numbers, got {tendon_change}")
+        clipped = np.clip(change, self.shortest, self.longest)
+        return clipped, clipped != change
+
+    def pull(self, tendon_change: ArrayLike) -> NDArray[np.float64]:
+        """Return the tendon lengths (9,) [m] that the motors realise: within range, to the nearest encoder
+        tick."""
+        change, _ = self.clip(tendon_change)
+        calibrated = self.arm.tendon_lengths(self.arm.home)
+        tick = 2 * np.pi / self.ticks_per_turn
+        angles = np.round(self.arm.motor_angles(calibrated + change) / tick) * tick
+        return self.arm.tendons_from_motors(angles)
+
+
+@dataclass(frozen=True)
+class Gripper:
+    """Three fingers that close on what lies between them.
+
+    The thesis gives no opening; success is therefore also reported as a function of it.
+
+    Attributes
+    ----------
+    opening : float
+        Farthest that the centre of a ball may lie from the gripper's axis [m].
+    above, below : float
+        Farthest that it may lie towards the palm and beyond the gripper point [m].
+    """
+
+    opening: float = 0.040
+    above: float = 0.050
+    below: float = 0.030
+
+    def __post_init__(self) -> None:
+        for name in ("opening", "above", "below"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+
+    def holds(self, points: ArrayLike, ball: ArrayLike) -> bool:
+        """Return whether closing at the true wrist and gripper (6,) catches a ball centred at `ball` (3,)
+        [m]."""
+        wrist, tip = np.asarray(points, dtype=float).reshape(2, 3)
+        axis = (tip - wrist) / np.linalg.norm(tip - wrist)
+        offset = np.asarray(ball, dtype=float) - tip
+        along = float(offset @ axis)
+        return bool(
+            -self.above <= along <= self.below and np.linalg.norm(offset - along * axis) <= self.opening
+        )

@@ -1,0 +1,246 @@
+"""One handover, and experiments 1 to 3 of the thesis (Vervloet, Sections 3.5 and 4).
+
+A run looks, decides and moves, step by step, until the gripper closes or the arm gives up. Success is judged by the
+true ball in the true gripper, never by what the filters believe. Frame `arm_base`, z down.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from soro_lib.controllers.handover import UP, HandoverController, HandoverParameters, Mode
+from soro_lib.robots.helix_plant import Gripper, Hand, HelixPlant
+from soro_lib.sensing.handover_observation import Observer
+
+STEP_SIZES = (0.1, 0.2, 0.4)
+"""alpha in the text, Table 1 and Figs. 7-8; Appendices A and B say 0.3 for the last (Erratum SH-18)."""
+
+HEADINGS = {"front": 90.0, "front-left": 135.0, "left": 180.0, "back-left": 225.0}
+"""Direction of the ball about z from +x [deg], seen from the cameras, which stand at +y (Section 3.5.1)."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Where the human holds the ball; not printed but for the four directions.
+
+    Attributes
+    ----------
+    lateral, height : float
+        From the calibrated gripper point to the ball, sideways and up [m].
+    headings : dict of str to float
+        Directions of the ball [deg].
+    placement_deviation : float
+        Standard deviation of where the hand holds the ball, per axis and run [m].
+    sway : float
+        Standard deviation of the hand while it holds still, per axis [m].
+    sway_memory : float
+        Correlation of the sway from step to step [-].
+    """
+
+    lateral: float = 0.15
+    height: float = 0.06
+    headings: dict[str, float] = field(default_factory=lambda: dict(HEADINGS))
+    placement_deviation: float = 0.010
+    sway: float = 0.002
+    sway_memory: float = 0.5
+
+    def ball(self, location: str, gripper: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return where the hand holds the ball (3,) [m], given the calibrated gripper point (3,)."""
+        heading = np.deg2rad(self.headings[location])
+        offset = self.lateral * np.array([np.cos(heading), np.sin(heading), 0.0]) + self.height * UP
+        return gripper + offset + self.placement_deviation * rng.standard_normal(3)
+
+
+@dataclass(frozen=True)
+class HandoverRun:
+    """What happened in one run.
+
+    Attributes
+    ----------
+    steps : int
+        Steps until the gripper closed, or all of them.
+    mode : Mode
+        Last mode: GRASP if the gripper closed.
+    reason : str
+        Why the arm gave up, or "".
+    success : bool
+        Whether the true ball was in the true gripper when it closed.
+    miss : float
+        Distance from the true gripper point to the true ball at the end [m].
+    lateral_overshoot : float
+        Farthest that the true gripper went past the ball, sideways [m].
+    state, ball : ndarray
+        True state (9,) and true ball (3,) at the end.
+    trace : dict of str to ndarray
+        One entry per step; see `TRACE_COLUMNS`.
+    """
+
+    steps: int
+    mode: Mode
+    reason: str
+    success: bool
+    miss: float
+    lateral_overshoot: float
+    state: NDArray[np.float64]
+    ball: NDArray[np.float64]
+    trace: dict[str, NDArray[np.float64]]
+
+
+TRACE_COLUMNS = (
+    "error_mm",
+    "measured_mm",
+    "commanded_mm",
+    "commanded_gap_mm",
+    "estimated_mm",
+    "estimated_gap_mm",
+    "estimate_residual_mm",
+    "miss_mm",
+)
+"""Error to the goal (six numbers together); then, for the gripper point: distance of the measured, commanded
+(``q_sys``) and estimated (``q_est``) one from the calibrated place, gaps of the last two to the measured one; residual
+of the state optimisation (six numbers together); distance of the true gripper from the true ball."""
+
+Guide = Callable[[int, NDArray[np.float64], NDArray[np.float64]], Hand | None]
+"""A human's hand on the arm: from step, true gripper (3,) and ball (3,) to the pull."""
+
+
+def run_handover(
+    controller: HandoverController,
+    plant: HelixPlant,
+    observer: Observer,
+    ball: NDArray[np.float64],
+    rng: np.random.Generator,
+    *,
+    scene: Scene | None = None,
+    gripper: Gripper | None = None,
+    guide: Guide | None = None,
+    step_limit: int = 300,
+) -> HandoverRun:
+    """Run one handover from the calibrated arm to the closed gripper (Vervloet, Algorithm 3).
+
+    Parameters
+    ----------
+    controller, plant, observer
+        Are reset first.
+    ball : ndarray, shape (3,)
+        Where the hand holds the ball [m].
+    rng : numpy.random.Generator
+    scene : Scene, optional
+        Whose sway the hand has.
+    gripper : Gripper, optional
+        Judges success.
+    guide : callable, optional
+        A human who pulls the arm.
+    step_limit : int
+    """
+    scene = scene or Scene()
+    gripper = gripper or Gripper()
+    for part in (controller, plant, observer):
+        part.reset()
+    arm = controller.arm
+    motors = controller.parameters.motors
+    calibrated = arm.tip_points(arm.home)[3:]
+    state = plant.settle(motors.pull(np.zeros(9)))
+    sway = np.zeros(3)
+    rows = []
+    overshoot = -np.inf
+    away = (ball - calibrated)[:2] / np.linalg.norm((ball - calibrated)[:2])
+    for step in range(step_limit):
+        sway = scene.sway_memory * sway
+        sway = sway + scene.sway * np.sqrt(1 - scene.sway_memory**2) * rng.standard_normal(3)
+        held_ball = ball + sway
+        command = controller.update(observer.observe(state, held_ball, rng))
+        points = arm.tip_points(state)
+        miss = float(np.linalg.norm(points[3:] - held_ball))
+        overshoot = max(overshoot, float((points[3:5] - held_ball[:2]) @ away))
+        commanded = arm.tip_points(command.q_sys)[3:]
+        estimated = np.full(3, np.nan)
+        if command.q_est is not None:
+            estimated = arm.tip_points(command.q_est)[3:]
+        measured = command.measured_points[3:]
+        rows.append(
+            (
+                command.error,
+                np.linalg.norm(measured - calibrated),
+                np.linalg.norm(commanded - calibrated),
+                np.linalg.norm(commanded - measured),
+                np.linalg.norm(estimated - calibrated),
+                np.linalg.norm(estimated - measured),
+                command.estimate_residual,
+                miss,
+            )
+        )
+        if command.mode in (Mode.GRASP, Mode.STOPPED):
+            break
+        hand = guide(step, points[3:], held_ball) if guide else None
+        state = plant.settle(motors.pull(command.tendon_change), hand)
+    success = command.mode is Mode.GRASP and gripper.holds(points, held_ball)
+    trace = dict(zip(TRACE_COLUMNS, 1e3 * np.array(rows).T))
+    return HandoverRun(step, command.mode, command.reason, success, miss, overshoot, state, held_ball, trace)
+
+
+def handovers(
+    parameters: HandoverParameters,
+    plant: HelixPlant,
+    observer: Observer,
+    repetitions: int,
+    seed: int,
+    *,
+    scene: Scene | None = None,
+    guide: Guide | None = None,
+    step_limit: int = 300,
+    **labels: object,
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Repeat the thesis's block of eight runs, four locations twice (Vervloet, Section 3.5.1).
+
+    Parameters
+    ----------
+    parameters, plant, observer
+        The controller's settings, the arm, and its eyes.
+    repetitions : int
+        Blocks of eight runs.
+    seed : int
+        The runs of one seed are the same whatever else runs.
+    scene, guide, step_limit
+        As in :func:`run_handover`.
+    **labels
+        Columns to carry in both tables (``alpha=0.1, plant="K"``).
+
+    Returns
+    -------
+    runs : DataFrame
+        One row per run: labels, block, run, location, steps, closed, success, miss_mm, overshoot_mm, reason.
+    traces : DataFrame
+        One row per step: labels, block, run, step and `TRACE_COLUMNS`.
+    """
+    scene = scene or Scene()
+    controller = HandoverController(parameters)
+    calibrated = controller.arm.tip_points(controller.arm.home)[3:]
+    runs, traces = [], []
+    places = [location for location in scene.headings for _ in range(2)]
+    seeds = np.random.SeedSequence(seed).spawn(repetitions * len(places))
+    for number, sequence in enumerate(seeds):
+        rng = np.random.default_rng(sequence)
+        block, run = divmod(number, len(places))
+        ball = scene.ball(places[run], calibrated, rng)
+        result = run_handover(
+            controller, plant, observer, ball, rng, scene=scene, guide=guide, step_limit=step_limit
+        )
+        identity = {**labels, "block": block, "run": run}
+        runs.append(
+            {
+                **identity,
+                "location": places[run],
+                "steps": result.steps,
+                "closed": result.mode is Mode.GRASP,
+                "success": result.success,
+                "miss_mm": 1e3 * result.miss,
+                "overshoot_mm": 1e3 * result.lateral_overshoot,
+                "reason": result.reason,
+            }
+        )
+        traces.append(pd.DataFrame({**identity, "step": np.arange(result.steps + 1), **result.trace}))
+    return pd.DataFrame(runs), pd.concat(traces, ignore_index=True)
