@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 
 import pandas as pd
@@ -15,6 +16,16 @@ from soro_lib.reporting.card import load_card
 from soro_lib.reporting.equations import load_equations, load_errata
 from soro_lib.reporting.scorecard import build_scorecard
 from soro_lib.studies.findings import Finding
+
+SHOWN_DPI = 110
+"""Size at which a notebook shows a figure [CSS pixels per inch]; the file has `policy.DPI`."""
+
+
+def as_image(figure: Figure) -> Image:
+    """Return a figure as the PNG that notebooks show; the same figure gives the same bytes."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=policy.DPI, metadata={"Software": None})
+    return Image(data=buffer.getvalue(), format="png", width=round(SHOWN_DPI * figure.get_size_inches()[0]))
 
 
 class Page:
@@ -42,7 +53,7 @@ class Page:
         display(HTML(markup.card_html(load_card(self.slug))))
 
     def figure(self, figure: Figure, name: str) -> None:
-        """Save a figure as ``<name>.png`` and show it; the same figure gives the same bytes.
+        """Save a figure as ``<name>.png`` and show it.
 
         Raises
         ------
@@ -50,11 +61,11 @@ class Page:
             If `name` has other characters than lower-case letters, digits and underscores.
         """
         path = self._path(name, "png")
+        image = as_image(figure)
         partial = path.with_suffix(".png.partial")
-        figure.savefig(partial, format="png", dpi=policy.DPI, metadata={"Software": None})
+        partial.write_bytes(image.data)
         os.replace(partial, path)
-        width, _ = figure.get_size_inches()
-        display(Image(filename=str(path), width=round(110 * width)))
+        display(image)
 
     def table(self, table: pd.DataFrame, name: str) -> None:
         """Save a table as ``<name>.csv`` without its index, six significant digits, and show it.
@@ -65,6 +76,10 @@ class Page:
             As `figure`.
         """
         self._write(table, name)
+        self.show(table)
+
+    def show(self, table: pd.DataFrame) -> None:
+        """Show a table without saving it."""
         display(HTML(markup.frame_html(table)))
 
     def equations(self) -> None:
@@ -86,6 +101,12 @@ class Page:
         scorecard = build_scorecard(self.slug, findings)
         self._write(scorecard, "scorecard")
         display(HTML(markup.scorecard_html(scorecard)))
+
+    def merged_scorecard(self, scorecards: Mapping[str, pd.DataFrame]) -> None:
+        """Show the scorecards of all papers, each folded under its name."""
+        for slug, scorecard in scorecards.items():
+            table = markup.scorecard_html(scorecard)
+            display(HTML(f"<details><summary>{slug}: {len(scorecard)} rows</summary>{table}</details>"))
 
     def _write(self, table: pd.DataFrame, name: str) -> None:
         path = self._path(name, "csv")

@@ -2,14 +2,13 @@
 
 import os
 
+from IPython import get_ipython
+
 
 def is_live() -> bool:
-    """Return whether sliders can work: inside a Jupyter kernel that the runner did not start headless.
+    """Return whether sliders can work: inside a Jupyter kernel that was not started by the runner.
 
-    The runner sets ``SORO_HEADLESS=1``; then, and outside a kernel, explorers show a static figure.
+    The runner is known by ``SORO_OUTPUT``, the folder that it makes a notebook write to; then, and outside a
+    kernel, explorers show a picture instead.
     """
-    if os.environ.get("SORO_HEADLESS", "0") not in ("", "0"):
-        return False
-    from IPython import get_ipython
-
-    return getattr(get_ipython(), "kernel", None) is not None
+    return "SORO_OUTPUT" not in os.environ and hasattr(get_ipython(), "kernel")

@@ -1,0 +1,61 @@
+"""From a figure of a paper to the file that rebuilds it."""
+
+import importlib
+import importlib.util
+import inspect
+import re
+
+import pandas as pd
+
+from soro_lib.project import figures_directory
+
+
+def figure_map(slugs: tuple[str, ...]) -> pd.DataFrame:
+    """List every figure and table that the notebooks have written.
+
+    Parameters
+    ----------
+    slugs
+        The notebooks, in order.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns ``paper``, ``place`` (in the paper, empty where the workbook adds something of its own), ``shows``
+        (first line of the docstring of the function that draws it) and ``file``.
+    """
+    rows = [
+        {
+            "paper": slug,
+            "place": place_in_paper(path.stem),
+            "shows": _shows(slug, path.stem),
+            "file": f"figures/{slug}/{path.name}",
+        }
+        for slug in slugs
+        for path in sorted(figures_directory(slug).glob("*"))
+        if path.suffix in (".png", ".csv") and path.stem != "scorecard"
+    ]
+    return pd.DataFrame(rows, columns=["paper", "place", "shows", "file"])
+
+
+def place_in_paper(name: str) -> str:
+    """Return the paper's own name for a figure or table, read off the file name.
+
+    Examples
+    --------
+    >>> place_in_paper("fig07a_infinity_path"), place_in_paper("table2_configurations"), place_in_paper("arms")
+    ('Fig. 7a', 'Table 2', '')
+    """
+    match = re.match(r"(fig|table)0*(\d+[a-z]?)(_|$)", name)
+    return f"{'Fig.' if match[1] == 'fig' else 'Table'} {match[2]}" if match else ""
+
+
+def _shows(slug: str, name: str) -> str:
+    """Return the first line of what draws the figure; the name in words where it has no function of its own."""
+    module = f"soro_lib.reporting.figures.{slug}"
+    function = None
+    if importlib.util.find_spec(module):
+        function = getattr(importlib.import_module(module), name, None)
+    text = inspect.getdoc(function) if function else None
+    words = re.sub(r"^(fig|table)\w*?_", "", name).replace("_", " ")
+    return text.splitlines()[0].rstrip(".") if text else words
