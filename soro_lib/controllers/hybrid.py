@@ -1,8 +1,8 @@
-"""Hybrid control of a pneumatic arm: constant-curvature model plus learned compensator (Wang et al., Sec. III).
+"""Hybrid control of a pneumatic arm: constant-curvature model plus compensator (Wang et al., Sec. III).
 
-The model-based half turns a wanted tip motion into chamber lengths (Eqs. (23)-(27)); the other half predicts from
-the last samples how much of a motion will be missing and asks for more (Eqs. (28), (29)). Controllers broadcast
-over leading axes, so a batch of seeds and gains runs as one.
+The model-based half turns a wanted tip motion into chamber lengths (Eqs. (23)-(27)); the other half predicts
+from the last samples how much of a motion will be missing and asks for more (Eqs. (28), (29)). Controllers
+broadcast over leading axes, so a batch of seeds and gains runs as one.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ def right_inverse(jacobian: ArrayLike, damping: float = 1e-5) -> Array:
     jacobian : array_like (..., 2, n)
         Tip velocity per chamber velocity [-].
     damping : float
-        Added in squares, so that the inverse stays below ``1 / (2 damping)`` where the Jacobian loses rank [-].
+        Added in squares, so that the inverse stays below ``1 / (2 damping)`` where the rank is lost [-].
 
     Returns
     -------
@@ -95,7 +95,7 @@ def compensate(desired: ArrayLike, predicted_error: ArrayLike, compensation: str
         Predicted error: [m] for "literal" and "additive", [-] for "relative"; not used by the others.
     compensation : str
         "none" keeps the desired displacement.
-        "quadratic" needs no learning: the error is taken to be the displacement itself, so the gain grows with it.
+        "quadratic" needs no learning: the error is taken to be the displacement itself.
         "literal" multiplies error and length, both in millimetres, as printed (Erratum VS-11).
         "relative" multiplies a relative error with the length, which has consistent units.
         "additive" adds the error.

@@ -1,7 +1,7 @@
 """Gaussian process regression on the newest samples, at a cost that fits into a control step.
 
-Scikit-learn's `GaussianProcessRegressor` with a fixed kernel factorises the whole window at every step. Here the
-inverse of the kernel matrix follows a replaced sample by two rank-one corrections; the result is the same
+Scikit-learn's `GaussianProcessRegressor` with a fixed kernel factorises the whole window at every step. Here
+the inverse of the kernel matrix follows a replaced sample by two rank-one corrections; the result is the same
 (tested against scikit-learn), and a whole batch of regressors runs as one.
 """
 
@@ -29,9 +29,9 @@ class RollingGaussianProcess:
 
     Notes
     -----
-    Equal to ``GaussianProcessRegressor(RBF(length_scales), alpha=noise**2, optimizer=None, normalize_y=True)``
-    fitted to the window. An empty slot is a sample that correlates with nothing, so that growing and rolling are
-    the same operation.
+    Equal to scikit-learn's ``GaussianProcessRegressor(RBF(length_scales), alpha=noise**2, optimizer=None,
+    normalize_y=True)`` fitted to the window. An empty slot is a sample that correlates with nothing, so that
+    growing and rolling are the same operation.
 
     Examples
     --------

@@ -223,13 +223,10 @@ class PneumaticPlant:
 
         Raises
         ------
-        ValueError
+        ActuationError
             If a command is not finite or outside the arm's limits; the plant has not moved then.
         """
-        lengths = np.asarray(lengths, dtype=float)
-        if lengths.shape[-1:] != (3,) or not np.isfinite(lengths).all():
-            raise ValueError(f"lengths must be finite and (..., 3), got {lengths}")
-        increment = lengths - self.motors
+        increment = self.arm.check(lengths) - self.motors
         resolution = np.asarray(self.chambers.resolution, dtype=float)
         whole = np.trunc(increment / np.where(resolution > 0.0, resolution, 1.0)) * resolution
         self.motors = self.motors + np.where(resolution > 0.0, whole, increment)
@@ -240,8 +237,9 @@ class PneumaticPlant:
 
     @property
     def lengths(self) -> Array:
-        """True chamber lengths, ``(..., 3)`` [m]."""
-        return self._home + self.chambers.stretch(self._piston)
+        """True chamber lengths, ``(..., 3)``, which stop at the limits of the arm [m]."""
+        lengths = self._home + self.chambers.stretch(self._piston)
+        return np.clip(lengths, self.arm.lower, self.arm.upper)
 
     @property
     def configuration(self) -> Array:

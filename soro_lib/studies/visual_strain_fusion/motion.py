@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from soro_lib import paths
 from soro_lib.arcs import chain_transform
 from soro_lib.robots.pneumatic import PneumaticArm
 from soro_lib.robots.pneumatic_plant import BackboneParameters
@@ -63,9 +64,7 @@ def spiral_bending(steps: int = 4000, turns: float = 4.743, largest: float = 0.9
     """
     if steps < 2:
         raise ValueError(f"steps must be at least 2, got {steps}")
-    progress = np.arange(steps) / (steps - 1)
-    angle = 2.0 * np.pi * turns * progress
-    return largest * np.sqrt(progress)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return paths.spiral(np.arange(steps) / (steps - 1), largest, turns)
 
 
 def move(

@@ -1,23 +1,15 @@
-"""Tracking a moving target: Tables I and II, the control experiments, and a closed curve (Wang et al., Sec. IV-D, E).
-
-The plant is the simulated one, calibrated on the model-based columns of the two tables and on nothing else; all
-hybrid columns are predictions.
-"""
+"""Tracking a moving target with the tip: paths, runs and their errors (Wang et al., Sec. IV-D)."""
 
 import tomllib
-from collections.abc import Sequence
-from copy import deepcopy
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from soro_lib.controllers.hybrid import HybridController, HybridSettings
+from soro_lib import paths
+from soro_lib.controllers.hybrid import HybridController
 from soro_lib.project import data_directory
-from soro_lib.robots.pneumatic import PneumaticArm
 from soro_lib.robots.pneumatic_plant import ChamberParameters, PneumaticPlant
 
 Array = NDArray[np.float64]
@@ -26,34 +18,71 @@ GAINS = (0.04, 0.06, 0.08, 0.10)
 RADIUS = 0.030
 """Radius of both paths [m]: deviation over percentage of the model cells of Table II gives 30.0-30.3 mm."""
 STEPS_PER_CYCLE = {"pentagram": 1000, "circle": 750}
+CYCLES = 2
 SENSOR_NOISE = 1e-4
 """Standard deviation of the electromagnetic tracker per axis [m] (not printed in the paper)."""
 
 
-def pentagram(steps: int, rotation: float = 0.0, radius: float = RADIUS) -> Array:
-    """Points ``(steps, 2)`` of a five-pointed star at even distances, from its top counter-clockwise [m]."""
-    corner = np.pi / 2 + rotation + 2.0 * np.pi * 2.0 / 5.0 * np.arange(6)
-    return resample(radius * np.stack([np.cos(corner), np.sin(corner)], axis=-1), steps)
-
-
-def circle(steps: int, rotation: float = 0.0, radius: float = RADIUS) -> Array:
-    """Points ``(steps, 2)`` of a circle at even distances, from +x counter-clockwise [m]."""
-    angle = rotation + 2.0 * np.pi * np.arange(steps) / steps
-    return radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def resample(vertices: ArrayLike, steps: int) -> Array:
-    """Points ``(steps, 2)`` at even distances along a closed polyline that repeats its first vertex [m]."""
-    vertices = np.asarray(vertices, dtype=float)
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(vertices, axis=0), axis=1))])
-    stations = travelled[-1] * np.arange(steps) / steps
-    return np.stack([np.interp(stations, travelled, vertices[:, axis]) for axis in range(2)], axis=-1)
-
-
 def path_points(path: str, rotation: float = 0.0) -> Array:
-    """One cycle of target points of "pentagram" or "circle" [m]."""
+    """One cycle of target points of the "pentagram" or "circle", ``(steps, 2)`` [m].
+
+    Parameters
+    ----------
+    path : str
+        Name of the path.
+    rotation : float
+        Turn of the path about the arm, counter-clockwise [rad].
+    """
     steps = STEPS_PER_CYCLE[path]
-    return {"pentagram": pentagram, "circle": circle}[path](steps, rotation)
+    curve = {"pentagram": paths.pentagram, "circle": paths.circle}[path]
+    return turn(curve(np.arange(steps) / steps, RADIUS), rotation)
+
+
+def turn(points: Array, angle: float) -> Array:
+    """Turn points ``(..., 2)`` counter-clockwise."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.asarray(points @ np.array([[cosine, sine], [-sine, cosine]]), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class FittedPlant:
+    """Plant parameters of one path, and how the path lies on the arm.
+
+    Attributes
+    ----------
+    chambers : ChamberParameters
+        Steppers, transmission, chambers.
+    rotation : float
+        Turn of the path about the arm [rad].
+    """
+
+    chambers: ChamberParameters
+    rotation: float
+
+
+def load_plant(path: str, hypothesis: str = "cap_3mm") -> FittedPlant:
+    """Plant that was fitted to the model-based columns of the tables, see `soro_lib.calibrations`.
+
+    Parameters
+    ----------
+    path : str
+        "pentagram" or "circle": the two experiments need different gains of the chambers.
+    hypothesis : str
+        "cap_3mm", or "no_cap" for the plant that was fitted without a cap on the desired step.
+
+    Raises
+    ------
+    ValueError
+        If the name is not one of these.
+    """
+    file = data_directory("visual_strain_fusion") / "plant.toml"
+    fitted = tomllib.loads(file.read_text(encoding="utf-8"))
+    if hypothesis not in fitted or f"gain_{path}" not in fitted[hypothesis]:
+        raise ValueError(f"{file.name} has no plant for path {path!r} under hypothesis {hypothesis!r}")
+    numbers = fitted[hypothesis]
+    names = ("resolution", "play", "dead_band", "softness", "exponent", "suction")
+    chambers = ChamberParameters(gain=numbers[f"gain_{path}"], **{name: numbers[name] for name in names})
+    return FittedPlant(chambers, numbers["rotation"])
 
 
 @dataclass(frozen=True)
@@ -64,8 +93,8 @@ class TrackingRun:
     ----------
     tip : ndarray (steps, ..., 2)
         True tip position [m].
-    target : ndarray (steps, 2)
-        Target position [m].
+    target : ndarray (steps, 2) or (steps, ..., 2)
+        Target position, common or one per member of the batch [m].
     saturated : float
         Share of the steps in which a chamber length met its limit.
     """
@@ -77,13 +106,14 @@ class TrackingRun:
     @property
     def error(self) -> Array:
         """Distance between tip and target, ``(steps, ...)`` [m]."""
-        target = self.target.reshape(len(self.target), *[1] * (self.tip.ndim - 2), 2)
+        batch = [1] * (self.tip.ndim - self.target.ndim)
+        target = self.target.reshape(len(self.target), *batch, *self.target.shape[1:])
         return np.asarray(np.linalg.norm(self.tip - target, axis=-1), dtype=np.float64)
 
-    def deviation(self, path: Array) -> Array:
-        """Distance between tip and the closest point of a closed path ``(n, 2)``, ``(steps, ...)`` [m]."""
-        dense = resample(np.vstack([path, path[:1]]), 20 * len(path))
-        return np.asarray(cKDTree(dense).query(self.tip)[0], dtype=np.float64)
+    def deviation(self, path: Array, every: int = 1) -> Array:
+        """Distance between tip and the closest point of a closed path ``(n, 2)``, of every n-th step [m]."""
+        dense = paths.polygon(np.arange(20 * len(path)) / (20 * len(path)), path)
+        return np.asarray(cKDTree(dense).query(self.tip[::every])[0], dtype=np.float64)
 
 
 def track(
@@ -103,8 +133,8 @@ def track(
         Moves on from its state.
     controller : HybridController
         Goes on with its samples.
-    targets : ndarray (steps, 2)
-        Target positions [m].
+    targets : ndarray (steps, 2) or (steps, ..., 2)
+        Target positions, common or one per member of the batch [m].
     compensating : bool
         Whether the compensator acts.
     rng : numpy.random.Generator, optional
