@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from soro_lib.controllers.gestures import GestureRule
 from soro_lib.controllers.hand_mapping import PalmMapping
+from soro_lib.datacards import verified, write_card
 from soro_lib.estimators.palm_filter import PAPER_SETTINGS, DirectionFilter, PalmFilter, PalmFilterSettings
 from soro_lib.project import data_directory
-from soro_lib.sensing.hand_tracking import HandSample, hand_samples, load_hand_recording
+from soro_lib.sensing.hand_tracking import FINGERS, HandSample, hand_samples, load_hand_recording
 from soro_lib.sensing.synthetic_hand import HandNoise, synthetic_recording, tracing, wandering
 
 Array = NDArray[np.float64]
@@ -27,6 +29,25 @@ FILTERS = {
     "R = 0.7 for all": PAPER_SETTINGS,
 }
 """The palm filters that are compared."""
+ABOUT = {
+    "steering_minute": "random steering through all four gestures, with tracking losses and palm flips",
+    "a4_palm": "a palm that traces the edges of an A4 sheet held flat",
+    "a4_finger": "a finger tip, in the palm columns, that traces the edges of an A4 sheet",
+    "hover": "eight seconds of hovering palm, then eight of hovering V-sign",
+}
+COLUMNS = {
+    "timestamp_us": "[us] device clock",
+    "frame_id": "[-] frame number",
+    "hand_id": "[-] identity given by the tracker; empty when no hand is seen",
+    "hand_type": "[-] left or right",
+    "confidence": "[-] confidence of the tracker, 0 to 1",
+    **{f"palm_{axis}_mm": f"[mm] palm centre, device {axis} (x right, y up, z toward the user)" for axis in "xyz"},
+    **{f"palm_n{axis}": f"[-] palm normal, a unit vector, device {axis}" for axis in "xyz"},
+    **{f"dir_{axis}": f"[-] direction of the hand, a unit vector, device {axis}" for axis in "xyz"},
+    **{finger: "[-] 1 = extended, 0 = curled" for finger in FINGERS},
+    **{f"palm_v{axis}_mm_s": f"[mm/s] palm velocity as reported, device {axis}" for axis in "xyz"},
+}
+"""Columns of the shipped recordings."""
 FINGERTIP = HandNoise(tremor=(0.1e-3, 0.12e-3, 0.1e-3), drift=0.7e-3)
 """A finger guided by an edge is steadier than a palm in the air."""
 
@@ -60,6 +81,17 @@ def shipped_recordings(seed: int = RECORDING_SEED) -> dict[str, pd.DataFrame]:
     }
 
 
+def write_recordings(directory: Path, seed: int = RECORDING_SEED) -> None:
+    """Write the shipped recordings and their data cards; the same seed gives the same bytes."""
+    for name, table in shipped_recordings(seed).items():
+        path = directory / f"{name}.csv.gz"
+        text = table.to_csv(index=False, lineterminator="\n").encode()
+        path.write_bytes(gzip.compress(text, mtime=0))
+        generator = "soro_lib.studies.gesture_steering.hands.shipped_recordings"
+        description = f"Simulated hand, no person was recorded: {ABOUT[name]}"
+        write_card(path, description=description, columns=COLUMNS, generator=generator, seed=seed)
+
+
 def steering_recording(rng: np.random.Generator, duration: float, noise: HandNoise | None = None) -> pd.DataFrame:
     """Simulate a person who steers at random through all gestures, inside the allowed box.
 
@@ -74,10 +106,12 @@ def steering_recording(rng: np.random.Generator, duration: float, noise: HandNoi
     """
     position = wandering(rng, duration, (-0.11, 0.13, -0.11), (0.11, 0.30, 0.11))
     pitch = wandering(rng, duration, (-0.4, -0.4), (0.4, 0.4))
-    gestures = [(0.0, "palm")]
+    gestures: list[tuple[float, str]] = [(0.0, "palm")]
+    coming: list[str] = []
     while gestures[-1][0] < duration - 8.0:
-        last, others = gestures[-1][1], ["v_sign", "thumbs_up", "fist"]
-        name = str(rng.choice(others)) if last == "palm" else "palm"
+        if not coming:
+            coming = rng.permutation(["v_sign", "thumbs_up", "fist"]).tolist()
+        name = coming.pop() if gestures[-1][1] == "palm" else "palm"
         gestures.append((gestures[-1][0] + rng.uniform(3.0, 7.0), name))
     return synthetic_recording(rng, duration, position, _tilting(pitch), gestures, noise)
 
@@ -238,4 +272,6 @@ def _tilting(pitch_and_roll):  # type: ignore[no-untyped-def]
 
 def load_recording(name: str) -> pd.DataFrame:
     """Load a recording by the name of a shipped one or by its path."""
-    return load_hand_recording(recording_path(name))
+    path = recording_path(name)
+    shipped = path.parent == data_directory("gesture_steering") / "recordings"
+    return load_hand_recording(verified(path) if shipped else path)

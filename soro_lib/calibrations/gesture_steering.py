@@ -1,0 +1,92 @@
+"""Declared calibration: the poses of Table II of Lai et al., and the actuations fitted to them.
+
+The paper prints where base, mid and tip of four configurations were in simulation and in the experiment, but not the
+seven actuator values. They are fitted here, openly; what follows from them about the simulated positions counts as
+calibrated, never as reproduced.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from soro_lib.project import data_directory
+from soro_lib.robots import CableDrivenArm
+from soro_lib.robots.cable_driven_kernels import compiled_kinematics
+
+Array = NDArray[np.float64]
+
+POINTS = ("base", "mid", "tip")
+"""Frames {B}, {M}, {T} of the paper."""
+
+
+def table2_positions() -> pd.DataFrame:
+    """Load the printed positions of Table II: ``configuration``, ``point``, ``sim_*_mm``, ``exp_*_mm``."""
+    return pd.read_csv(data_directory("gesture_steering") / "table2_positions.csv")
+
+
+def printed_positions(kind: str) -> Array:
+    """Return the positions (4 configurations, 3 points, 3 axes) [m]; ``kind`` is "sim" or "exp"."""
+    columns = [f"{kind}_{axis}_mm" for axis in "xyz"]
+    return table2_positions()[columns].to_numpy(dtype=float).reshape(4, 3, 3) * 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPose:
+    """The admissible actuation whose base, mid and tip come closest to a printed pose.
+
+    Attributes
+    ----------
+    actuation : ndarray (7,)
+        Slide [m] and cables.
+    mid, tip : ndarray (3,)
+        Where the model then is [m].
+    mid_residual, tip_residual : float
+        Distances to the printed positions [m].
+    """
+
+    actuation: Array
+    mid: Array
+    tip: Array
+    mid_residual: float
+    tip_residual: float
+
+
+def fitted_pose(
+    arm: CableDrivenArm, base: Array, mid: Array, tip: Array, pretension: float = 0.02
+) -> FittedPose:
+    """Fit the actuation to printed base, mid and tip positions (3,) [m] by bounded least squares."""
+    kinematics = compiled_kinematics(arm)
+    lower, upper = arm.lower.copy(), arm.upper.copy()
+    upper[1:] = -pretension
+
+    def residual(actuation: Array) -> Array:
+        pose = kinematics(actuation)
+        least_tension = 1e-3 * actuation[1:]
+        slide = (actuation[:1] - base[2]) * 1e3
+        return np.concatenate([slide, (pose.mid - mid) * 1e3, (pose.tip - tip) * 1e3, least_tension])
+
+    def slope(actuation: Array) -> Array:
+        pose = kinematics(actuation)
+        return np.vstack(
+            [1e3 * np.eye(7)[:1], pose.mid_jacobian * 1e3, pose.tip_jacobian * 1e3, 1e-3 * np.eye(7)[1:]]
+        )
+
+    starts = [np.concatenate([[base[2]], np.full(6, tension)]) for tension in (-0.1, -0.5, -1.0)]
+    starts = [np.clip(start, lower, upper) for start in starts]
+    fits = [least_squares(residual, start, slope, bounds=(lower, upper), x_scale="jac") for start in starts]
+    actuation = min(fits, key=lambda fit: fit.cost).x
+    pose = kinematics(actuation)
+    return FittedPose(
+        actuation, pose.mid, pose.tip, float(np.linalg.norm(pose.mid - mid)), float(np.linalg.norm(pose.tip - tip))
+    )
+
+
+def table2_poses(arm: CableDrivenArm | None = None) -> list[FittedPose]:
+    """Fit all four configurations of Table II."""
+    arm = arm or CableDrivenArm()
+    return [fitted_pose(arm, *points) for points in printed_positions("sim")]
