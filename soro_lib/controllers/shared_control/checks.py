@@ -45,14 +45,14 @@ def sample_count(elapsed: float | None, sample_rate: float) -> float:
     return 1.0 if elapsed is None else positive("elapsed", elapsed) * sample_rate
 
 
-def goal_points(name: str, value: ArrayLike, reach: float) -> NDArray[np.float64]:
-    """Goals as an (n, 3) array, each finite, below the base and within reach."""
-    points = np.array(value, dtype=float, order="C")
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
-        raise ValueError(f"{name} must have shape (n, 3) with n >= 1, got {points.shape}")
+def goal_points(name: str, value: ArrayLike, reach: float) -> tuple[Vector, ...]:
+    """Goals (n, 3) as a tuple of points, each finite, below the base and within reach."""
+    array = np.asarray(value, dtype=float)
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
+        raise ValueError(f"{name} must have shape (n, 3) with n >= 1, got {array.shape}")
+    points = tuple(vector(f"{name}[{index}]", point) for index, point in enumerate(array))
     for index, point in enumerate(points):
-        finite_vector(f"{name}[{index}]", point)
-        distance = float(np.linalg.norm(point))
+        distance = math.hypot(*point)
         if point[2] <= 0:
             raise ValueError(f"{name}[{index}] must lie below the base (z > 0), got z = {point[2]} m")
         if distance > reach:

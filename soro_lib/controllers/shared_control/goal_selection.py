@@ -19,10 +19,10 @@ LIFT_MARGIN = 0.02
 
 
 class GoalRule(NamedTuple):
-    """Constants of the goal machine; items and targets are (n, 3) arrays [m]."""
+    """Constants of the goal machine; items and targets are tuples of points [m]."""
 
-    items: NDArray[np.float64]
-    targets: NDArray[np.float64]
+    items: tuple[Vector, ...]
+    targets: tuple[Vector, ...]
     lift: bool
     lift_offset: float
     lifted_height: float
@@ -36,12 +36,6 @@ class GoalState(NamedTuple):
     item: int
     goal: Vector
     pick: Vector
-
-
-@register_jitable
-def row(points: NDArray[np.float64], index: int) -> Vector:
-    """One row of an (n, 3) array as a triple."""
-    return (points[index, 0], points[index, 1], points[index, 2])
 
 
 @register_jitable
@@ -62,9 +56,9 @@ def lift_goal(rule: GoalRule, end_effector: Vector) -> Vector:
 def fetch(rule: GoalRule, item: int) -> GoalState:
     """Turn to an item, or end where none is left."""
     if item >= len(rule.items):
-        last = row(rule.targets, len(rule.targets) - 1)
+        last = rule.targets[len(rule.targets) - 1]
         return GoalState(END, item, last, last)
-    place = row(rule.items, item)
+    place = rule.items[item]
     return GoalState(GRASPING, item, place, place)
 
 
@@ -81,13 +75,13 @@ def goal_step(rule: GoalRule, state: GoalState, end_effector: Vector, item_held:
         if rule.lift:
             state = GoalState(LIFTING_WITH_ITEM, state.item, lift_goal(rule, end_effector), state.pick)
         else:
-            state = GoalState(PLACING, state.item, row(rule.targets, state.item), state.pick)
+            state = GoalState(PLACING, state.item, rule.targets[state.item], state.pick)
     if state.phase == LIFTING_WITH_ITEM:
         if not item_held and not rule.printed:
-            lost = (end_effector[0], end_effector[1], rule.items[state.item, 2])
+            lost = (end_effector[0], end_effector[1], rule.items[state.item][2])
             state = GoalState(GRASPING, state.item, lost, lost)
         elif end_effector[2] <= rule.lifted_height:
-            state = GoalState(PLACING, state.item, row(rule.targets, state.item), state.pick)
+            state = GoalState(PLACING, state.item, rule.targets[state.item], state.pick)
     if state.phase == PLACING and not item_held:
         if rule.lift:
             state = GoalState(LIFTING_EMPTY, state.item, lift_goal(rule, end_effector), state.pick)
@@ -156,7 +150,7 @@ class GoalSelection:
             )
         positive("lift_offset", lift_offset)
         positive("lifted_height", lifted_height)
-        lowest = float(min(pick[:, 2].min(), place[:, 2].min()))
+        lowest = float(min(point[2] for point in (*pick, *place)))
         if lift and lifted_height >= lowest:
             raise ValueError(
                 f"lifted_height = {lifted_height} m must be above every goal (z < {lowest} m, z points down)"
@@ -166,7 +160,7 @@ class GoalSelection:
 
     def reset(self) -> None:
         """Return to the first item."""
-        first = row(self.rule.items, 0)
+        first = self.rule.items[0]
         self.state = GoalState(BEGIN, 0, first, first)
 
     def update(self, end_effector: ArrayLike, item_held: bool) -> GoalResult:

@@ -21,7 +21,8 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from soro_lib.controllers.shared_control import goal_selection
-from soro_lib.controllers.shared_control.goal_selection import LIFTING_EMPTY, row
+from soro_lib.controllers.shared_control.checks import Vector
+from soro_lib.controllers.shared_control.goal_selection import LIFTING_EMPTY
 from soro_lib.controllers.shared_control.guidance import distance_to_goal
 from soro_lib.operators import EXPERT, Operator, loop
 from soro_lib.operators.hand import hand_command
@@ -91,12 +92,13 @@ class TrialPlan:
 
 
 @register_jitable
-def next_place(task: TaskRule, state: TaskState, memory: TaskMemory) -> tuple[float, float, float]:
+def next_place(task: TaskRule, state: TaskState, items: NDArray[np.float64]) -> Vector:
     """Where the operator wants to go: the target of the item in the gripper, else the next item."""
     if state.gripper.item != NOTHING:
-        return row(memory.targets, state.gripper.item)
+        return task.targets[state.gripper.item]
     following = state.goal.item + 1 if state.goal.phase == LIFTING_EMPTY else state.goal.item
-    return row(memory.items, min(following, len(memory.items) - 1))
+    item = min(following, len(items) - 1)
+    return (items[item, 0], items[item, 1], items[item, 2])
 
 
 @register_jitable
@@ -132,7 +134,7 @@ def play(
 ) -> TaskState:
     """Let the operator work until the last item is placed or the time is up; ``trace`` may have no lines."""
     while state.sample < samples and not delivered(task, state):
-        wanted = next_place(task, state, memory)
+        wanted = next_place(task, state, memory.items)
         held = state.gripper.item != NOTHING
         view = View(state.plant.tip, state.desired, wanted, state.force, held, task.automation)
         human = operator_step(operator, human, pictures, view, rng)
@@ -169,7 +171,7 @@ _compiled_play = _compile(_digest())
 def play_trial(
     plan: TrialPlan, rule: TaskRule, samples: int, trace: NDArray[np.float64], compiled: bool = True
 ) -> tuple[TaskState, TaskMemory]:
-    """Simulate one trial; ``compiled=False`` runs the same functions in the interpreter, a thousand times slower.
+    """Simulate one trial; ``compiled=False`` runs the same functions in the interpreter, far more slowly.
 
     Returns
     -------
@@ -202,7 +204,7 @@ def trial_metrics(rule: TaskRule, state: TaskState, memory: TaskMemory) -> list[
     finished = bool(delivered(rule, state))
     time = SAMPLE_TIME * state.sample
     opened = 1e3 * memory.releases[:, 1]
-    across = 1e3 * np.hypot(*(memory.items - memory.targets)[:, :2].T)
+    across = 1e3 * np.hypot(*(memory.items - np.array(rule.targets))[:, :2].T)
     times = np.diff(memory.releases[:, 0], prepend=0.0)
     mean = float(np.mean(opened)) if finished else np.nan
     placed = float(np.mean(across)) if finished else np.nan
@@ -243,8 +245,8 @@ def simulate(
     jobs : int
         Threads in this process; the numbers do not depend on it.
     scheduler : str or distributed.Client, optional
-        Address of a Dask scheduler, or a client of one. The trials then run on its workers; lost workers' trials
-        are run again elsewhere. The numbers are the same.
+        Address of a Dask scheduler, or a client of one. The trials then run on its workers; what a lost worker
+        had under way is run again elsewhere. The numbers are the same.
     chunk : int
         Trials per task.
 

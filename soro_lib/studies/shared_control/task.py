@@ -39,7 +39,6 @@ from soro_lib.controllers.shared_control.goal_selection import (
     GoalSelection,
     GoalState,
     goal_step,
-    row,
 )
 from soro_lib.controllers.shared_control.guidance import distance_to_goal, guidance_force, hooke_magnitude
 from soro_lib.controllers.shared_control.paradigms import ASSISTANCES, PARADIGMS, Paradigm, desired_position
@@ -153,9 +152,12 @@ class TaskSettings:
         )
         return TaskRule(
             goals=goals.rule,
+            items=self.scene.items,
+            targets=self.scene.targets,
             assist=assist.rule,
             assist_maximum=assist.maximum_force,
             fixed=spring.rule,
+            window=len(spring.window),
             plant=plant.rule(),
             gripper=REAL_GRIPPER if real else SIMULATED_GRIPPER,
             assistance=ASSISTANCES.index(self.paradigm.assistance),
@@ -166,12 +168,15 @@ class TaskSettings:
 
 
 class TaskRule(NamedTuple):
-    """Everything that stays fixed during a trial, as plain numbers."""
+    """What stays fixed during a trial; ``goals`` are as detected, ``items`` and ``targets`` as they are."""
 
     goals: GoalRule
+    items: tuple[Vector, ...]
+    targets: tuple[Vector, ...]
     assist: AssistRule
     assist_maximum: float
     fixed: FixedRule
+    window: int
     plant: PlantRule
     gripper: GripperRule
     assistance: int
@@ -193,8 +198,6 @@ class TaskMemory(NamedTuple):
     window: NDArray[np.float64]
     delayed: NDArray[np.float64]
     items: NDArray[np.float64]
-    targets: NDArray[np.float64]
-    heights: NDArray[np.float64]
     releases: NDArray[np.float64]
 
 
@@ -226,21 +229,18 @@ class TaskState(NamedTuple):
 
 def task_memory(rule: TaskRule, scene: Scene) -> TaskMemory:
     """Fresh arrays for one trial."""
-    items = np.array(scene.items, dtype=float)
     return TaskMemory(
-        window=np.zeros(50),
+        window=np.zeros(rule.window),
         delayed=command_buffer(rule.plant, scene.start),
-        items=items,
-        targets=np.array(scene.targets, dtype=float),
-        heights=items[:, 2].copy(),
-        releases=np.full((len(items), 4), np.nan),
+        items=np.array(scene.items, dtype=float),
+        releases=np.full((len(scene.items), 4), np.nan),
     )
 
 
 def task_start(rule: TaskRule, start: Vector) -> TaskState:
     """A trial before its first sample: tip at rest, gripper open, no force."""
     zero = (0.0, 0.0, 0.0)
-    first = row(rule.goals.items, 0)
+    first = rule.goals.items[0]
     return TaskState(
         sample=0,
         goal=GoalState(0, 0, first, first),
@@ -267,12 +267,12 @@ def horizontal(a: Vector, b: Vector) -> float:
 
 
 @register_jitable
-def carry(memory: TaskMemory, before: int, after: int, tip: Vector) -> None:
-    """Move the held item with the tip; a released one falls straight down to its table height."""
+def carry(rule: TaskRule, items: NDArray[np.float64], before: int, after: int, tip: Vector) -> None:
+    """Move the held item with the tip; a released one falls straight down to where it lay."""
     moved = after if after != NOTHING else before
     if moved != NOTHING:
-        memory.items[moved, 0], memory.items[moved, 1] = tip[0], tip[1]
-        memory.items[moved, 2] = tip[2] if after != NOTHING else memory.heights[moved]
+        items[moved, 0], items[moved, 1] = tip[0], tip[1]
+        items[moved, 2] = tip[2] if after != NOTHING else rule.items[moved][2]
 
 
 @register_jitable
@@ -328,15 +328,15 @@ def task_step(
     opening_error = state.tally.opening_error
     item = state.gripper.item
     if item != NOTHING and state.closed and not closed:
-        opening_error = horizontal(tip, row(memory.targets, item))
+        opening_error = horizontal(tip, rule.targets[item])
     gripper = gripper_step(rule.gripper, state.gripper, memory.items, tip, desired, closed, rng)
-    carry(memory, item, gripper.item, tip)
+    carry(rule, memory.items, item, gripper.item, tip)
     if item == NOTHING and gripper.item != NOTHING:
         memory.releases[gripper.item, 3] = time
     elif item != NOTHING and gripper.item == NOTHING and state.goal.phase == PLACING:
         memory.releases[item, 0] = time
         memory.releases[item, 1] = opening_error
-        memory.releases[item, 2] = horizontal(row(memory.items, item), row(memory.targets, item))
+        memory.releases[item, 2] = horizontal(tip, rule.targets[item])
 
     tracked = tracked_tip(tip, rule.plant.tracking_noise, rng)
     held = confirmed if rule.confirmed_by_hand else gripper.item != NOTHING

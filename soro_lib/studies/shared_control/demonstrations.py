@@ -1,0 +1,136 @@
+"""The demonstrations: six paradigms, expert and naive, simulated and real, five trials each.
+
+First as the paper did, with four individuals; then with a crowd, for effects with intervals.
+
+Source: Stroppa et al., Section 5.4.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from soro_lib.controllers.shared_control import PARADIGMS
+from soro_lib.operators import ATTITUDES, POPULATIONS, Operator
+from soro_lib.studies.shared_control.simulation import TrialPlan, simulate
+from soro_lib.studies.shared_control.task import TaskSettings
+
+ENVIRONMENTS = ("simulated", "real")
+KINDS = ("expert", "naive")
+TRIALS = 5
+
+
+def draw_operators(kind: str, count: int, seed: int, **changes: float) -> list[Operator]:
+    """People of one kind; the first ones are the same however many are drawn.
+
+    Parameters
+    ----------
+    kind : {"expert", "naive"}
+    count : int
+    seed : int
+    **changes
+        Parameters of `Operator` set alike for all (an attitude, no approach from above, ...).
+
+    Raises
+    ------
+    ValueError
+        If there is no such kind, or a parameter is out of bounds.
+    """
+    if kind not in POPULATIONS:
+        raise ValueError(f"kind must be one of {tuple(POPULATIONS)}, got {kind!r}")
+    streams = (np.random.default_rng([seed, 1, KINDS.index(kind), person]) for person in range(count))
+    return [replace(POPULATIONS[kind].draw(rng), **changes) for rng in streams]
+
+
+def demonstration_plans(
+    operators: int,
+    seed: int,
+    trials: int = TRIALS,
+    attitude: str = "ignore",
+    approach_height: float = 0.1,
+    kinds: Sequence[str] = KINDS,
+    environments: Sequence[str] = ENVIRONMENTS,
+    **settings: Any,
+) -> Iterator[TrialPlan]:
+    """Every operator of every kind through every paradigm in every environment.
+
+    A trial's chance is shared by the six paradigms: comparisons are paired. The two environments have
+    different people, as in the paper.
+
+    Parameters
+    ----------
+    operators : int
+        People per kind and environment.
+    seed : int
+    trials : int
+        Per person and paradigm.
+    attitude : {"ignore", "use", "yield"}
+        To the guidance force.
+    approach_height : float
+        0.1 m: from above, as the paper says; 0: in a straight line.
+    kinds, environments : sequence of str
+    **settings
+        Passed on to `TaskSettings` (force_law, detection_error, ...).
+    """
+    changes = {**ATTITUDES[attitude], "approach_height": approach_height}
+    for environment in environments:
+        place = ENVIRONMENTS.index(environment)
+        for kind in kinds:
+            people = draw_operators(kind, operators, seed + 1000 * place, **changes)
+            for name, paradigm in PARADIGMS.items():
+                setting = TaskSettings(paradigm, environment=environment, **settings)  # type: ignore[arg-type]
+                for person, operator in enumerate(people):
+                    for trial in range(trials):
+                        chance = (seed, 2, place, KINDS.index(kind), person, trial)
+                        labels = {
+                            "environment": environment,
+                            "kind": kind,
+                            "paradigm": name,
+                            "operator": person,
+                            "trial": trial,
+                        }
+                        yield TrialPlan(setting, operator, chance, labels)
+
+
+def run_demonstrations(
+    operators: int, seed: int, jobs: int = 1, scheduler: Any = None, **options: Any
+) -> pd.DataFrame:
+    """Simulate the demonstrations; one line per trial. Options as in `demonstration_plans`."""
+    return simulate(demonstration_plans(operators, seed, **options), jobs=jobs, scheduler=scheduler)
+
+
+def summary(trials: pd.DataFrame, resamples: int = 2000, seed: int = 0) -> pd.DataFrame:
+    """Mean of each metric over people, with a 95 % bootstrap interval over people.
+
+    Time-outs count with their full time; errors are those of finished trials.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns environment, kind, paradigm, metric, mean, low, high, finished (share of trials).
+    """
+    metrics = ["time_s", "release_error_mm", "path_m", "assistance_n"]
+    cells = ["environment", "kind", "paradigm"]
+    people = trials.groupby([*cells, "operator"], sort=False)[metrics].mean()
+    finished = trials.groupby(cells, sort=False)["finished"].mean()
+    rng = np.random.default_rng(seed)
+    rows = []
+    for cell, group in people.groupby(cells, sort=False):
+        values = group.to_numpy()
+        picks = rng.integers(len(values), size=(resamples, len(values)))
+        low, high = np.nanpercentile(np.nanmean(values[picks], axis=1), [2.5, 97.5], axis=0)
+        for index, metric in enumerate(metrics):
+            row = dict(zip(cells, cell, strict=True))
+            row |= {"metric": metric, "mean": np.nanmean(values[:, index])}
+            rows.append({**row, "low": low[index], "high": high[index], "finished": finished[cell]})
+    return pd.DataFrame(rows)
+
+
+def paired_effect(trials: pd.DataFrame, first: str, second: str, metric: str) -> pd.DataFrame:
+    """Difference of two paradigms for every operator, columns environment, kind, operator, difference."""
+    means = trials.pivot_table(
+        index=["environment", "kind", "operator"], columns="paradigm", values=metric, sort=False
+    )
+    return (means[first] - means[second]).rename("difference").reset_index()
