@@ -1,4 +1,4 @@
-"""What all four arms share: Jacobians against differences, batches against single calls, the rule for limits."""
+"""What all four arms share: Jacobians against differences, batches against single calls, limits."""
 
 import warnings
 
