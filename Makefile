@@ -44,7 +44,7 @@ check: env ## lint, types, and whether what is committed is what the notebooks p
 	@$(RUN) soro_lib.reporting.check
 
 lab: env ## open JupyterLab on the overview notebook
-	@$(RUN) jupyter lab notebooks/00_overview.ipynb
+	@$(RUN) jupyterlab notebooks/00_overview.ipynb
 
 bench: env ## measure speed against other libraries (installs them beside)
 	@$(RUN) benchmarks.run --install-peers

@@ -176,8 +176,8 @@ def execute_in_place(root: Path) -> None:
         (edit("environment.txt"), {"alpha", "beta", "overview"}),
         (edit("figures/beta/robot.csv"), {"beta"}),
         (edit("figures/alpha/scorecard.csv"), {"alpha", "overview"}),
-        (lambda root: (root / "figures/alpha/tip.csv").unlink(), {"alpha"}),
-        (lambda root: (root / "figures/beta/more.png").write_bytes(b"x"), {"beta"}),
+        (lambda root: (root / "figures/alpha/tip.csv").unlink(), {"alpha", "overview"}),
+        (lambda root: (root / "figures/beta/more.png").write_bytes(b"x"), {"beta", "overview"}),
         (lambda root: (root / "figures/beta/.DS_Store").write_bytes(b"x"), set()),
         (lambda root: shutil.rmtree(root / "build"), {"alpha", "beta", "overview"}),
         (edit_cell, {"beta"}),
@@ -268,11 +268,25 @@ def test_other_parameters_and_quick_leave_the_figures_alone(project: Path) -> No
     assert stale(project) == set()
 
 
+def test_a_file_named_by_a_parameter_is_found_and_its_content_counts(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (project / "own.csv").write_text("1")
+    monkeypatch.chdir(project)
+    value = Parameter("recording", "str", "", "").parse("own.csv")
+    assert value == str(project / "own.csv")
+    notebook = find_notebooks(project / "notebooks")["beta"]
+    before = current_inputs(notebook, {"name": value}, project, project / "figures")
+    (project / "own.csv").write_text("2")
+    after = current_inputs(notebook, {"name": value}, project, project / "figures")
+    assert {name for name in after if before[name] != after[name]} == {"own.csv"}
+
+
 def test_files_of_the_run_before_disappear(project: Path) -> None:
     arguments = ["run", "--only", "alpha", "-p", "name", "other", "--output", str(project / "figures")]
     assert main(arguments, project) == 0
     assert set(files(project / "figures" / "alpha")) == {"other.csv", "scorecard.csv"}
-    assert stale(project) == {"alpha"}
+    assert stale(project) == {"alpha", "overview"}
 
 
 def test_failures_are_named_kept_and_stop_nothing_else(

@@ -41,13 +41,15 @@ class Parameter:
     def parse(self, text: str) -> Any:
         """Return the value that ``text`` from the command line stands for.
 
+        The name of a file is made absolute, since a notebook runs in a folder of its own.
+
         Raises
         ------
         ParameterError
             If the text is not a value of the declared type.
         """
         if self.type == "str":
-            return text
+            return str(Path(text).resolve()) if Path(text).is_file() else text
         literal = text.capitalize() if self.type == "bool" else text
         try:
             value = ast.literal_eval(literal)

@@ -55,8 +55,8 @@ def current_inputs(
     """Return a digest of everything that a notebook's figures follow from.
 
     These are its cells, the parameters that differ from the defaults, the lock, the Python version, the
-    library modules that it imports, and the data folders that it or those modules name. The overview follows
-    from the scorecards of all the others and from the tables beside them.
+    library modules that it imports, the data folders that it or those modules name, and any file that a
+    parameter names. The overview follows from the scorecards and file names of all the others.
     """
     modules = dependencies(notebook.code, root)
     texts = [*notebook.code, *(path.read_text(encoding="utf-8") for path in modules)]
@@ -66,14 +66,22 @@ def current_inputs(
         files |= _visible_files(root / "data" / slug)
     if notebook.slug == OVERVIEW:
         files |= {path for path in (root / "data").glob("*/*") if path.suffix in {".csv", ".toml"}}
-        files |= set(figures.glob("*/scorecard.csv")) - {figures / OVERVIEW / "scorecard.csv"}
+        others = [path for path in _figures_to_read(root, figures) if path.parent.name != OVERVIEW]
+        files |= {path for path in others if path.name == "scorecard.csv"}
+        names = [f"{path.parent.name}/{path.name}" for path in others]
+    else:
+        names = []
+    files |= {
+        Path(value) for value in parameters.values() if isinstance(value, str) and Path(value).is_file()
+    }
     cells = [[cell.cell_type, cell.source, cell.metadata.get("tags", [])] for cell in notebook.cells]
     return {
         "notebook": _digest(json.dumps(cells)),
         "parameters": _digest(json.dumps(parameters, sort_keys=True)),
         "Python version": f"{sys.version_info.major}.{sys.version_info.minor}",
         "environment.txt": _digest_file(root / "environment.txt"),
-        **{_name(path, root, figures): _digest_file(path) for path in sorted(files)},
+        "names of the figures": _digest(json.dumps(sorted(names))),
+        **{_shown(path, root): _digest_file(path) for path in sorted(files)},
     }
 
 
@@ -95,9 +103,14 @@ def _package_data(modules: set[Path]) -> set[Path]:
     return {path for path in beside if path.is_file() and path.suffix != ".py" and path.name[0] != "."}
 
 
-def _name(path: Path, root: Path, figures: Path) -> str:
-    inside = path.is_relative_to(figures)
-    return f"figures/{path.relative_to(figures)}" if inside else path.relative_to(root).as_posix()
+def _figures_to_read(root: Path, figures: Path) -> list[Path]:
+    """Return the figures of this run and, of notebooks that it has not run, the committed ones."""
+    folders = {path.name: path for path in [*(root / "figures").glob("*/"), *figures.glob("*/")]}
+    return [path for folder in folders.values() if folder.is_dir() for path in _visible_files(folder)]
+
+
+def _shown(path: Path, root: Path) -> str:
+    return path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)
 
 
 def _digest(text: str) -> str:
