@@ -44,6 +44,8 @@ class SafetyRules:
         Steps for which a ball out of sight is still approached.
     frozen_looks : int
         Identical looks at the arm, while it is being moved, after which the cameras count as frozen.
+    noticeable_move : float
+        Commanded movement of wrist and gripper that must show in the next look [m].
     largest_jump : float
         Farthest that wrist or ball may appear from their last place [m].
     jump_confirmations : int
@@ -62,6 +64,7 @@ class SafetyRules:
 
     ball_memory: int = 5
     frozen_looks: int = 2
+    noticeable_move: float = 0.001
     largest_jump: float = 0.15
     jump_confirmations: int = 3
     largest_disagreement: float = 0.02
@@ -216,7 +219,7 @@ class HandoverController:
         self.place: NDArray[np.float64] | None = None
         self._expected_move = np.zeros(6)
         self._task_mode = Mode.APPROACH
-        self._last_look: HandoverObservation | None = None
+        self._last_wrist: NDArray[np.float64] | None = None
         self._last_seen: dict[str, NDArray[np.float64]] = {}
         self._jumps = {"wrist": 0, "ball": 0}
         self._repeats = 0
@@ -321,12 +324,11 @@ class HandoverController:
         wrist, direction, ball = (finite(v) for v in (look.wrist, look.direction, look.ball))
         if ball is not None and not look.disagreement <= rules.largest_disagreement:
             ball = None
-        last = self._last_look
-        if last is not None and wrist is not None and np.array_equal(wrist, last.wrist):
-            self._repeats += 1
-        else:
+        if wrist is None or self._last_wrist is None or not np.array_equal(wrist, self._last_wrist):
             self._repeats = 0
-        self._last_look = look
+        elif np.linalg.norm(self._expected_move) > rules.noticeable_move:
+            self._repeats += 1
+        self._last_wrist = wrist
         if self._repeats >= rules.frozen_looks:
             wrist = direction = ball = None
         else:

@@ -43,17 +43,17 @@ EQUILIBRIUM_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Hand:
-    """A hand that holds the gripper like a spring.
+    """A hand that holds wrist and gripper like a spring each.
 
     Attributes
     ----------
-    point : tuple of 3 float
-        Where the hand wants the gripper [m], frame `arm_base`.
+    points : ndarray, shape (6,)
+        Where the hand wants wrist and gripper [m], frame `arm_base`.
     stiffness : float
-        Of the grip [N/m].
+        Of the grip, at each of the two points [N/m].
     """
 
-    point: tuple[float, float, float]
+    points: NDArray[np.float64]
     stiffness: float = 200.0
 
 
@@ -64,8 +64,12 @@ class HelixPlant(Protocol):
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m]."""
         ...
 
+    def carry(self, mass: float) -> None:
+        """Hang a mass [kg] into the gripper."""
+        ...
+
     def reset(self) -> None:
-        """Forget where the arm is."""
+        """Forget where the arm is and what it carries."""
         ...
 
 
@@ -132,6 +136,9 @@ class AngleLossPlant:
         """Put the arm back to its calibrated state."""
         self._free = self.arm.home.copy()
 
+    def carry(self, mass: float) -> None:
+        """Take a mass [kg] without any effect: this plant knows no weight."""
+
     def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m].
 
@@ -146,22 +153,20 @@ class AngleLossPlant:
         return held_state(
             self._free,
             self.stiffness.diagonal(self.arm),
-            np.array(hand.point),
+            hand.points,
             hand.stiffness,
             self.arm.gripper_length,
         )
 
 
 @njit(cache=True)
-def held_state(free, stiffness, point, grip, gripper_length):
-    """Return the state of least ``(q - free)' K (q - free) + grip |gripper(q) - point|^2``, by
-    Gauss-Newton."""
+def held_state(free, stiffness, held, grip, gripper_length):
+    """Return the state of least ``(q - free)' K (q - free) + grip |f(q) - held|^2``, by Gauss-Newton."""
     q = free.copy()
     for _ in range(50):
         points, jacobian = tip_points_and_jacobian(q, gripper_length)
-        pull = jacobian[3:]
-        gradient = stiffness * (q - free) + grip * multiply(pull.T, points[3:] - point)
-        hessian = np.diag(stiffness) + grip * pull.T @ pull
+        gradient = stiffness * (q - free) + grip * multiply(jacobian.T, points - held)
+        hessian = np.diag(stiffness) + grip * jacobian.T @ jacobian
         step = -cholesky_solve(cholesky(hessian), gradient)
         q = q + min(1.0, LONGEST_NEWTON_STEP / np.abs(step).max()) * step
         if np.abs(step).max() < EQUILIBRIUM_TOLERANCE:
@@ -218,6 +223,11 @@ class ElasticPlant:
         """Start the next search from the calibrated state."""
         self._state = self.arm.home.copy()
         self._realised = self.arm.tendon_lengths(self.arm.home)
+        self._payload = 0.0
+
+    def carry(self, mass: float) -> None:
+        """Hang a mass [kg] into the gripper, where its own mass is."""
+        self._payload = mass
 
     def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m].
@@ -241,9 +251,9 @@ class ElasticPlant:
             self.stiffness.diagonal(self.arm),
             free,
             self.linear_density * lengths,
-            self.gripper_mass,
+            self.gripper_mass + self._payload,
             self.gripper_mass_distance,
-            np.array(hand.point) if hand else np.zeros(3),
+            hand.points if hand else np.zeros(6),
             hand.stiffness if hand else 0.0,
             self.arm.gripper_length,
         )
@@ -264,7 +274,7 @@ def equilibrium(
     masses,
     tip_mass,
     tip_distance,
-    point,
+    held,
     grip,
     gripper_length,
 ):
@@ -281,7 +291,7 @@ def equilibrium(
             masses,
             tip_mass,
             tip_distance,
-            point,
+            held,
             grip,
             gripper_length,
         )
@@ -310,7 +320,7 @@ def energy_slopes(
     masses,
     tip_mass,
     tip_distance,
-    point,
+    held,
     grip,
     gripper_length,
 ):
@@ -331,8 +341,8 @@ def energy_slopes(
         hessian[:, j] -= GRAVITY * (ahead - fall) / nudge[j]
     if grip > 0:
         points, jacobian = tip_points_and_jacobian(q, gripper_length)
-        gradient += grip * multiply(jacobian[3:].T, points[3:] - point)
-        hessian += grip * jacobian[3:].T @ jacobian[3:]
+        gradient += grip * multiply(jacobian.T, points - held)
+        hessian += grip * jacobian.T @ jacobian
     return gradient, 0.5 * (hessian + hessian.T)
 
 
@@ -363,6 +373,10 @@ class LaggingPlant:
         """Forget where the arm is; the next call finds it at rest."""
         self.plant.reset()
         self._state = None
+
+    def carry(self, mass: float) -> None:
+        """Hang a mass [kg] into the gripper."""
+        self.plant.carry(mass)
 
     def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
         """Return the true state q (9,) one timestep later."""
@@ -434,16 +448,15 @@ class Gripper:
     ----------
     opening : float
         Farthest that the centre of a ball may lie from the gripper's axis [m].
-    above, below : float
-        Farthest that it may lie towards the palm and beyond the gripper point [m].
+    reach : float
+        Farthest that it may lie along the axis from the gripper point, to either side [m].
     """
 
     opening: float = 0.040
-    above: float = 0.050
-    below: float = 0.030
+    reach: float = 0.040
 
     def __post_init__(self) -> None:
-        for name in ("opening", "above", "below"):
+        for name in ("opening", "reach"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
 
@@ -454,6 +467,4 @@ class Gripper:
         axis = (tip - wrist) / np.linalg.norm(tip - wrist)
         offset = np.asarray(ball, dtype=float) - tip
         along = float(offset @ axis)
-        return bool(
-            -self.above <= along <= self.below and np.linalg.norm(offset - along * axis) <= self.opening
-        )
+        return bool(abs(along) <= self.reach and np.linalg.norm(offset - along * axis) <= self.opening)

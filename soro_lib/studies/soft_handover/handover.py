@@ -1,7 +1,7 @@
 """One handover, and experiments 1 to 3 of the thesis (Vervloet, Sections 3.5 and 4).
 
-A run looks, decides and moves, step by step, until the gripper closes or the arm gives up. Success is judged by the
-true ball in the true gripper, never by what the filters believe. Frame `arm_base`, z down.
+A run looks, decides and moves, step by step, until the gripper closes or the arm gives up. Success is judged
+by the true ball in the true gripper, never by what the filters believe. Frame `arm_base`, z down.
 """
 
 from collections.abc import Callable
@@ -47,7 +47,9 @@ class Scene:
     sway: float = 0.002
     sway_memory: float = 0.5
 
-    def ball(self, location: str, gripper: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    def ball(
+        self, location: str, gripper: NDArray[np.float64], rng: np.random.Generator
+    ) -> NDArray[np.float64]:
         """Return where the hand holds the ball (3,) [m], given the calibrated gripper point (3,)."""
         heading = np.deg2rad(self.headings[location])
         offset = self.lateral * np.array([np.cos(heading), np.sin(heading), 0.0]) + self.height * UP
@@ -100,8 +102,9 @@ TRACE_COLUMNS = (
     "miss_mm",
 )
 """Error to the goal (six numbers together); then, for the gripper point: distance of the measured, commanded
-(``q_sys``) and estimated (``q_est``) one from the calibrated place, gaps of the last two to the measured one; residual
-of the state optimisation (six numbers together); distance of the true gripper from the true ball."""
+(``q_sys``) and estimated (``q_est``) one from the calibrated place, gaps of the last two to the measured
+one; residual of the state optimisation (six numbers together); distance of the true gripper from the true
+ball."""
 
 Guide = Callable[[int, NDArray[np.float64], NDArray[np.float64]], Hand | None]
 """A human's hand on the arm: from step, true gripper (3,) and ball (3,) to the pull."""
@@ -188,6 +191,7 @@ def handovers(
     observer: Observer,
     repetitions: int,
     seed: int,
+    /,
     *,
     scene: Scene | None = None,
     guide: Guide | None = None,
