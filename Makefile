@@ -13,7 +13,9 @@ ONLY =
 FORCE = $(if $(findstring B,$(firstword -$(MAKEFLAGS))),--force)
 RUNNER_OPTIONS = $(FORCE) $(if $(JOBS),--jobs $(JOBS)) $(foreach slug,$(ONLY),--only $(slug))
 
-CALIBRATIONS = $(patsubst soro_lib/%.py,%,$(wildcard soro_lib/calibrations/[a-z]*.py))
+# A calibration, and a study that ships simulated data, writes its files when it is run as a module.
+CALIBRATIONS = $(subst /,.,$(basename $(wildcard soro_lib/calibrations/[a-z]*.py)))
+GENERATORS = $(subst /,.,$(patsubst %/__main__.py,%,$(wildcard soro_lib/studies/*/__main__.py)))
 
 help: ## list the commands
 	@echo "make <command>  [JOBS=n: notebooks at once]  [ONLY=slug: this notebook]  [PYTHON=interpreter]"
@@ -58,14 +60,10 @@ lock: env ## renew environment.txt from pyproject.toml
 	    --generate-hashes --no-emit-index-url --no-header --quiet -o environment.txt
 
 calibrate: env ## fit the declared calibrations again
-	@for module in $(subst /,.,$(CALIBRATIONS)); do \
-	    echo "soro_lib.$$module" && $(RUN) soro_lib.$$module || exit 1; \
-	done
+	@for module in $(CALIBRATIONS); do echo $$module && $(RUN) $$module || exit 1; done
 
 data: env ## simulate the recordings in data/ again
-	@for module in $(GENERATORS); do \
-	    echo "soro_lib.$$module" && $(RUN) soro_lib.$$module || exit 1; \
-	done
+	@for module in $(GENERATORS); do echo $$module && $(RUN) $$module || exit 1; done
 
 clean: ## remove .venv and everything under build/
 	rm -rf .venv build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
