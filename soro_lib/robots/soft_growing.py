@@ -93,23 +93,6 @@ class SoftGrowingArm(Robot):
         pieces[..., 1, 2] = eversion_length(tip)
         return pieces
 
-    def jacobian(self, actuation: ArrayLike) -> FloatArray:
-        """Return the tip Jacobian, shape (..., 6, 3): identity, then the turning of the body [rad/m].
-
-        The angular part is ``[p]x / L^2 - p (-y, x, 0) / (L^2 (L + z))``: the swing of the body, and
-        the spin about it that keeps the tip frame the shortest turn away from the base frame.
-        """
-        tip = self.check(actuation)
-        x, y, z = np.moveaxis(tip, -1, 0)
-        zero = np.zeros_like(x)
-        length = eversion_length(tip)[..., np.newaxis, np.newaxis]
-        swing = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*tip.shape, 3)
-        around = np.stack([-y, x, zero], axis=-1)[..., np.newaxis, :] / (
-            length + z[..., np.newaxis, np.newaxis]
-        )
-        turning = (swing - tip[..., np.newaxis] * around) / length**2
-        return np.concatenate([np.broadcast_to(np.eye(3), turning.shape), turning], axis=-2)
-
     def configuration_jacobian(self, actuation: ArrayLike) -> FloatArray:
         """Return d configuration / d actuation, shape (..., 6, 3)."""
         tip = self.check(actuation)

@@ -43,7 +43,17 @@ def test_hanging_straight_is_regular(scale):
     tip = np.array([scale, -scale, 0.5])
     expected = [[0, -1 / 0.5, 0], [1 / 0.5, 0, 0], [0, 0, 0]]
     np.testing.assert_allclose(ARM.jacobian(tip)[3:], expected, rtol=0, atol=1e-5)
-    np.testing.assert_array_equal(ARM.jacobian(tip)[:3], np.eye(3))
+    np.testing.assert_allclose(ARM.jacobian(tip)[:3], np.eye(3), rtol=0, atol=1e-15)
+
+
+@given(tips)
+def test_jacobian_is_the_swing_of_the_body_less_its_spin(tip):
+    """In closed form: [p]x / L^2, less the spin about the body that keeps the frame the shortest turn."""
+    (x, y, z), length = tip, np.linalg.norm(tip)
+    swing = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    spin = np.outer(tip, [-y, x, 0.0]) / (length + z)
+    expected = np.vstack([np.eye(3), (swing - spin) / length**2])
+    np.testing.assert_allclose(ARM.jacobian(tip), expected, rtol=0, atol=1e-12 / length)
 
 
 @given(points)
