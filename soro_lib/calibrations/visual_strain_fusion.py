@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import differential_evolution
+from scipy.optimize import Bounds, differential_evolution
 
 from soro_lib.controllers.hybrid import HybridController, HybridSettings
 from soro_lib.project import data_directory
@@ -104,9 +104,9 @@ def misfit(candidates: Array, cap: float) -> Array:
 def search(cap: float, generations: int = GENERATIONS) -> tuple[Array, float]:
     """Search the nine parameters from scratch; return them and their misfit."""
     result = differential_evolution(
-        misfit,
-        list(BOUNDS.values()),
-        args=(cap,),
+        # scipy's stubs do not know the vectorised form, which returns one value per candidate.
+        lambda candidates: misfit(candidates, cap),  # type: ignore[arg-type, misc]
+        Bounds(*np.array(list(BOUNDS.values())).T),
         maxiter=generations,
         popsize=10,
         tol=0.0,

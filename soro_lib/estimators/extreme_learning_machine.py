@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.blas import dsymv, dsyr
 
+from soro_lib.poses import align_quaternion
+
 Array = NDArray[np.float64]
 
 POSE_SIZE = 7
@@ -88,11 +90,9 @@ def same_hemisphere(poses: ArrayLike, reference: ArrayLike) -> Array:
     ndarray (..., 7)
         The same poses; q and -q are one rotation, but their average is not.
     """
-    poses, reference = np.broadcast_arrays(np.asarray(poses, dtype=float), np.asarray(reference, dtype=float))
-    aligned = poses.copy()
-    flip = np.einsum("...i,...i->...", poses[..., 3:], reference[..., 3:]) < 0.0
-    aligned[flip, 3:] *= -1.0
-    return aligned
+    poses = np.asarray(poses, dtype=float)
+    aligned = align_quaternion(poses[..., 3:], np.asarray(reference, dtype=float)[..., 3:])
+    return np.concatenate([np.broadcast_to(poses[..., :3], (*aligned.shape[:-1], 3)), aligned], axis=-1)
 
 
 class ExtremeLearningMachine:
@@ -219,7 +219,14 @@ class ExtremeLearningMachine:
         if not np.isfinite(poses).all():
             raise ValueError(f"pose of sample {np.argwhere(~np.isfinite(poses))[0, 0]} is not finite")
         labels = same_hemisphere(poses, poses[0])
-        factor = cho_factor(hidden.T @ hidden + self.regularisation * np.eye(hidden.shape[1]), lower=True)
+        normal = hidden.T @ hidden + self.regularisation * np.eye(hidden.shape[1])
+        try:
+            factor = cho_factor(normal, lower=True)
+        except np.linalg.LinAlgError:
+            raise ValueError(
+                f"the normal matrix is singular in floating point (condition {np.linalg.cond(normal):.1e}); "
+                f"raise regularisation={self.regularisation}"
+            ) from None
         self.weights = cho_solve(factor, hidden.T @ labels)
         self._covariance = np.asfortranarray(cho_solve(factor, np.eye(hidden.shape[1])))
         self.label_variance = float(np.mean((labels - hidden @ self.weights)[:, :3] ** 2))

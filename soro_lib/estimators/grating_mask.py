@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
+REFRESH = 10
+"""Number of learned samples after which the model is inverted anew."""
+
 
 @dataclass(frozen=True)
 class RepairedShift:
@@ -55,11 +58,23 @@ class GratingMask:
             raise ValueError(f"noise and gate must be above 0, got {noise} and {gate}")
         self.gate = gate
         self.most = shifts.shape[1] // 3 if most is None else most
-        self._mean = shifts.mean(axis=0)
         self._scale = noise
+        self._mean = shifts.mean(axis=0)
+        self._count = len(shifts)
         deviations = (shifts - self._mean) / noise
-        self._covariance = deviations.T @ deviations / len(shifts) + np.eye(shifts.shape[1])
-        self._precision = np.linalg.inv(self._covariance)
+        self._scatter = deviations.T @ deviations
+        self._refresh()
+
+    def learn(self, shift: ArrayLike) -> None:
+        """Add one sample that is known to be free of contact, ``(l,)`` [m]; what is not finite is ignored."""
+        deviation = (np.asarray(shift, dtype=float) - self._mean) / self._scale
+        if not np.isfinite(deviation).all():
+            return
+        self._count += 1
+        self._mean = self._mean + self._scale * deviation / self._count
+        self._scatter += (1.0 - 1.0 / self._count) * np.multiply.outer(deviation, deviation)
+        if self._count % REFRESH == 0:
+            self._refresh()
 
     def repair(self, shift: ArrayLike) -> RepairedShift:
         """Set aside the gratings that disagree, worst first, and fill them in from the rest.
@@ -97,6 +112,10 @@ class GratingMask:
         if masked.any():
             deviation[masked] = self._covariance[masked] @ (precision @ deviation)
         return RepairedShift(np.where(masked, self._mean + self._scale * deviation, shift), masked)
+
+    def _refresh(self) -> None:
+        self._covariance = self._scatter / self._count + np.eye(len(self._scatter))
+        self._precision = np.linalg.inv(self._covariance)
 
     def _marginal_precision(self, masked: NDArray[np.bool_]) -> Array:
         """Precision of the trusted gratings alone, padded with zeros to the full size."""

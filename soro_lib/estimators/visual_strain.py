@@ -28,6 +28,8 @@ class VisualStrainSettings:
         Feature count below which the reprojection error is raised; 0 takes it as it comes.
     grating_noise : float
         Standard deviation of one shift, for the contact mask [m]; 0 leaves the mask out.
+    agreement : float
+        Distance of camera and fibre up to which they confirm each other; no grating is doubted then [m].
     """
 
     initial_samples: int = 450
@@ -36,12 +38,13 @@ class VisualStrainSettings:
     upper: float = 2.4
     nominal_inliers: float = 200.0
     grating_noise: float = 0.0
+    agreement: float = 2e-3
 
     def __post_init__(self) -> None:
         """Check the values; the error names the field and its bound."""
         if self.initial_samples < 1:
             raise ValueError(f"initial_samples must be at least 1, got {self.initial_samples}")
-        for name in ("update_threshold", "nominal_inliers", "grating_noise"):
+        for name in ("update_threshold", "nominal_inliers", "grating_noise", "agreement"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise ValueError(f"{name} must be finite and not negative, got {getattr(self, name)}")
         if not 0.0 <= self.lower < self.upper < np.inf:
@@ -152,7 +155,7 @@ class VisualStrainEstimator:
             return self._repeat(f"time stamp {time} does not follow {self._time}")
         self._time = time
         error = self._watch_camera(camera_pose, reprojection_error, inliers)
-        shift, masked, whole = self._watch_fibre(shift)
+        shift, masked, whole = self._watch_fibre(shift, error)
         learnable = whole and error <= self.settings.update_threshold
         if not self.network.is_fitted:
             return self._collect(shift, error, learnable, masked)
@@ -186,10 +189,16 @@ class VisualStrainEstimator:
             return float(reprojection_error)
         return float(inlier_weighted_error(reprojection_error, inliers, self.settings.nominal_inliers))
 
-    def _watch_fibre(self, shift: Array) -> tuple[Array, int, bool]:
-        """Repair the shifts; return them, the number set aside, and whether all are finite."""
+    def _watch_fibre(self, shift: Array, error: float) -> tuple[Array, int, bool]:
+        """Doubt the gratings unless the camera confirms them; return shifts, number set aside, all finite."""
+        whole = bool(np.isfinite(shift).all())
         if self._mask is None:
-            return shift, 0, bool(np.isfinite(shift).all())
+            return shift, 0, whole
+        if whole and error <= self.settings.update_threshold:
+            apart = self.network.predict(shift)[:3] - self._camera_pose[:3]
+            if apart @ apart < self.settings.agreement**2:
+                self._mask.learn(shift)
+                return shift, 0, True
         repaired = self._mask.repair(shift)
         return repaired.shift, int(repaired.masked.sum()), not repaired.masked.all()
 

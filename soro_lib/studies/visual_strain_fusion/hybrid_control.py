@@ -35,7 +35,7 @@ READINGS: dict[str, HybridSettings] = {
     "additive": HybridSettings(compensation="additive"),
     "actual motion": HybridSettings(compensation="literal", trained_on="actual"),
 }
-"""Readings of Eq. (29): the printed one, the control without learning, and three others that suggest themselves."""
+"""Readings of Eq. (29): the printed one, the control without learning, and three others."""
 
 
 @dataclass(frozen=True)
@@ -174,24 +174,17 @@ def summarise(comparison: Comparison) -> pd.DataFrame:
 def improvements(summary: pd.DataFrame) -> pd.DataFrame:
     """Reduction of mean error and deviation against the model-based run of the same seed [%]."""
     keys = ["path", "gain", "seed"]
-    model = summary[summary.controller == "model"].set_index(keys)
-    rest = summary[summary.controller != "model"].set_index([*keys, "controller"])
-    change = {
-        f"{measure}_improvement_percent": 100.0
-        * (
-            1.0
-            - rest[f"{measure}_mm"]
-            / model[f"{measure}_mm"].reindex(rest.index.droplevel("controller")).values
-        )
-        for measure in ("error", "deviation")
-    }
-    return pd.DataFrame(change).reset_index()
+    model = summary[summary.controller == "model"]
+    table = summary[summary.controller != "model"].merge(model, on=keys, suffixes=("", "_model"))
+    for measure in ("error", "deviation"):
+        reduction = 1.0 - table[f"{measure}_mm"] / table[f"{measure}_mm_model"]
+        table[f"{measure}_improvement_percent"] = 100.0 * reduction
+    return table[[*keys, "controller", "error_improvement_percent", "deviation_improvement_percent"]]
 
 
 def interval(values: Sequence[float], rng: np.random.Generator, resamples: int = 2000) -> tuple[float, float]:
     """Bootstrap interval (95 %) of the mean over seeds."""
-    values = np.asarray(values, dtype=float)
-    means = rng.choice(values, (resamples, len(values))).mean(axis=1)
+    means = rng.choice(np.asarray(values, dtype=float), (resamples, len(values))).mean(axis=1)
     low, high = np.percentile(means, [2.5, 97.5])
     return float(low), float(high)
 
