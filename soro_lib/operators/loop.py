@@ -12,6 +12,12 @@ from soro_lib.operators.decision import DECIDED_NOTHING, Decision, decide
 from soro_lib.operators.hand import Hand, Movement, hand_step, intend, plan_submovement
 from soro_lib.operators.people import DEVICE_SCALE, SAMPLE_TIME, Operator, Vector
 
+RESTING_SPEED = 0.002
+"""Speed below which a tip looks at rest [m/s]."""
+
+RESIGNED_OFFSET = 0.05
+"""Largest offset at which an operator presses for want of anything better [m]: the side of a cube."""
+
 LOOK_PERIOD = 0.2
 """Time between two glances at the depth [s]."""
 
@@ -37,6 +43,7 @@ class OperatorState(NamedTuple):
     sample: int
     think_until: float
     last_held: bool
+    resting: float
     belief: Belief
     movement: Movement
     hand: Hand
@@ -51,6 +58,7 @@ def operator_start(tip: Vector) -> OperatorState:
         sample=0,
         think_until=0.0,
         last_held=True,
+        resting=0.0,
         belief=Belief(0.0, 0.0, 0.0, 0.0, zero),
         movement=Movement(zero, -10.0, 1.0, rest),
         hand=Hand(rest, zero, zero),
@@ -157,7 +165,11 @@ def operator_step(
         belief = Belief(belief.right, belief.up, belief.depth, glance, belief.shift)
 
     goal = believed_goal(rule, belief, view)
-    looks_right = distance(goal, seen) < 1.5 * rule.tolerance
+    offset = distance(goal, seen)
+    machine = max(view.automation[0], view.automation[1], view.automation[2])
+    resting = state.resting + SAMPLE_TIME if speed < RESTING_SPEED and machine > 0.0 else 0.0
+    resigned = resting > rule.resignation and offset < RESIGNED_OFFSET
+    looks_right = offset < 1.5 * rule.tolerance or resigned
     size = distance(view.force, (0.0, 0.0, 0.0))
     if looks_right:
         belief = heed_force(rule, belief, view.force, size)
@@ -176,4 +188,4 @@ def operator_step(
     decided = decide(rule, decision, looks_right and time >= think_until, pulled, view.held)
     if decision.closed and not decided.closed and not view.held:
         belief = scaled_belief(belief, 1.0 - rule.learn)
-    return OperatorState(state.sample + 1, think_until, view.held, belief, movement, hand, decided)
+    return OperatorState(state.sample + 1, think_until, view.held, resting, belief, movement, hand, decided)

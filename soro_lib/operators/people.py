@@ -60,6 +60,9 @@ class Operator:
         Pause before each phase [s].
     learn : float
         Share of the bias removed by a failed grasp [-].
+    resignation : float
+        Where the machine steers: time a resting tip is watched before the button is pressed although the place
+        looks slightly wrong [s]; assumption, 3 s.
     hand_mass, hand_damping, hand_stiffness : float
         Hand with device [kg, N s/m, N/m]; van Beek et al. 2015.
     device_friction : float
@@ -102,6 +105,7 @@ class Operator:
     press: float = 0.25
     think: float = 0.4
     learn: float = 0.5
+    resignation: float = 3.0
     hand_mass: float = 0.6
     hand_damping: float = 6.5
     hand_stiffness: float = 150.0

@@ -5,6 +5,7 @@ Source: Stroppa et al., Sections 5.4 and 5.5; thresholds for "alike" and "not fe
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -186,7 +187,7 @@ PAIR_CLAIMS = {
 """Claims that compare one expert with one naive user, in each environment."""
 
 ACROSS_CLAIM = "aan_gain_larger_simulated"
-"""Naive users gain more from Assist-as-Needed over Fixed Assistance in the simulation than on the real arm."""
+"""Naive users gain more from Assist-as-Needed over Fixed Assistance in the simulation than in reality."""
 
 
 def operator_means(trials: pd.DataFrame) -> Means:
@@ -198,7 +199,7 @@ def operator_means(trials: pd.DataFrame) -> Means:
         One kind of operator in one environment: columns operator, paradigm and the metrics of a trial.
     """
 
-    def table(metric: str, how: str = "mean") -> pd.DataFrame:
+    def table(metric: str, how: Literal["mean", "max"] = "mean") -> pd.DataFrame:
         return trials.pivot_table(index="operator", columns="paradigm", values=metric, aggfunc=how)
 
     return Means(
@@ -245,7 +246,8 @@ def _operator_records(trials: pd.DataFrame) -> Iterator[Record]:
 
 
 def _pair_records(trials: pd.DataFrame) -> Iterator[Record]:
-    means = {key: operator_means(group) for key, group in trials.groupby(["environment", "kind"], sort=False)}
+    groups = trials.groupby(["environment", "kind"], sort=False)
+    means = {(str(place), str(kind)): operator_means(group) for (place, kind), group in groups}
     environments = list(dict.fromkeys(environment for environment, _ in means))
     for environment in environments:
         if (environment, "expert") not in means or (environment, "naive") not in means:

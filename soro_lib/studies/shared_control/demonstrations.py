@@ -114,7 +114,7 @@ def summary(trials: pd.DataFrame, resamples: int = 2000, seed: int = 0) -> pd.Da
     metrics = ["time_s", "release_error_mm", "path_m", "assistance_n"]
     cells = ["environment", "kind", "paradigm"]
     people = trials.groupby([*cells, "operator"], sort=False)[metrics].mean()
-    finished = trials.groupby(cells, sort=False)["finished"].mean()
+    finished = trials.groupby(cells, sort=False)["finished"].mean().to_dict()
     rng = np.random.default_rng(seed)
     rows = []
     for cell, group in people.groupby(cells, sort=False):

@@ -63,7 +63,8 @@ def factorial_plans(
 ) -> Iterator[TrialPlan]:
     """Every combination of the levels, for each repetition of each operator.
 
-    Trials of one repetition share their random stream over the settings: the comparison is paired.
+    Every trial has a random stream of its own, as a person never repeats himself: streams shared over the
+    settings would leave the analysis hardly any error to divide by.
 
     Parameters
     ----------
@@ -96,7 +97,7 @@ def factorial_plans(
             for repetition in range(repetitions):
                 labels = dict(zip(names, levels, strict=True))
                 labels |= {"operator": person, "repetition": repetition}
-                yield TrialPlan(setting, operator, (seed, 3, person, repetition), labels)
+                yield TrialPlan(setting, operator, (seed, 3, person, repetition, *levels), labels)
 
 
 def run_factorial(

@@ -42,7 +42,7 @@ def mean_assistance(forces: ArrayLike, times: ArrayLike) -> float:
 
 
 def placement_error(items: ArrayLike, targets: ArrayLike) -> float:
-    """Mean horizontal distance P of the items from their targets [m] (Stroppa et al., Eq. (11), Erratum SC-17).
+    """Mean horizontal distance P of the items from their targets [m] (Stroppa et al., Eq. (11)).
 
     Parameters
     ----------

@@ -245,8 +245,8 @@ def simulate(
     jobs : int
         Threads in this process; the numbers do not depend on it.
     scheduler : str or distributed.Client, optional
-        Address of a Dask scheduler, or a client of one. The trials then run on its workers; what a lost worker
-        had under way is run again elsewhere. The numbers are the same.
+        Address of a Dask scheduler, or a client of one. The trials then run on its workers; what a lost
+        worker had under way is run again elsewhere. The numbers are the same.
     chunk : int
         Trials per task.
 
