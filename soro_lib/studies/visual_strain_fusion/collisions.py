@@ -1,9 +1,9 @@
 """Pushes and flicks: camera and fibre disturbed at once (Wang et al., Sec. IV-F and Appendix).
 
 Stated causes, no injected error. A force bends the backbone away from the shapes that the network was
-trained on: the fibre sees the true curvature, but the network extrapolates. A finger on the body also squeezes the
-gratings under it, by the shifts of Table VII. A fast motion blurs the image until the features are lost and the
-camera holds its last pose.
+trained on: the fibre sees the true curvature, but the network extrapolates. A finger on the body also squeezes
+the gratings under it, by the shifts of Table VII. A fast motion blurs the image until the features are lost
+and the camera holds its last pose.
 
 Calibrated: the force of the push (15 mm at the tip) and the squeeze of a grating (Table VII). Assumed: shape,
 decay, frequency and force of the flick, exposure of the camera. Everything else is predicted.
@@ -159,7 +159,7 @@ def force_profile(kind: str, time: Array) -> Array:
 
 def simulate_contacts(
     contact: Contact, rng: np.random.Generator, steps: int = 4000
-) -> tuple[ArmMotion, Array, Array]:
+) -> tuple[ArmMotion, NDArray[np.int64], Array]:
     """Let the arm follow the spiral while it is touched.
 
     Returns
