@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.controllers.gestures import GestureRule, Mode
 from soro_lib.controllers.hand_gate import GatedHand, GateSettings, HandGate
-from soro_lib.controllers.hand_mapping import PalmMapping, TipGoal, constrained_goal
+from soro_lib.controllers.hand_mapping import PalmMapping, TipGoal, Vector
 from soro_lib.controllers.obstacles import Sphere, clearances
 from soro_lib.controllers.steering_step import (
     Step,
@@ -193,7 +193,7 @@ class GestureSteering:
         self._palm = PalmFilter(self.settings.palm_filter)
         self._direction = DirectionFilter(self.settings.direction_time_constant)
         self._direction.reset(self.pose.direction)
-        self._hand_goal = TipGoal(tuple(self.pose.tip.tolist()), tuple(self.pose.direction.tolist()))
+        self._hand: tuple[Vector, Vector] | None = None  # palm [m] and normal that are followed, device frame
         self._target, self._locked_mid = self.pose.tip, self.pose.mid
         self._time: float | None = None
 
@@ -207,7 +207,7 @@ class GestureSteering:
         self._follow(hand, hand_sample.time)
         self._change(mode)
 
-        goal = constrained_goal(mode, self._hand_goal)
+        goal = self._goal(mode)
         if interval > 0:
             self._target = self._approached(goal, interval)
             self._direction.update(interval, goal.direction)
@@ -231,17 +231,22 @@ class GestureSteering:
 
     def _follow(self, hand: GatedHand, time: float) -> None:
         """Update what the hand asks for; hold it, after a short prediction, when the frame is not sound."""
-        mapping = self.settings.mapping
         if hand.valid:
             if hand.restart:
                 self._palm.reset()
             palm = self._palm.update(time, hand.palm, hand.velocity).tolist()
-            self._hand_goal = TipGoal(mapping.position(palm), mapping.direction(hand.normal))
-        elif hand.reason == "no hand" and self._palm.time is not None:
+            self._hand = (palm, hand.normal)
+        elif hand.reason == "no hand" and self._hand is not None and self._palm.time is not None:
             if time - self._palm.time <= self.settings.gate.predict_for:
                 palm = self._palm.predicted(time).tolist()
-                if mapping.in_box(palm):
-                    self._hand_goal = self._hand_goal._replace(position=mapping.position(palm))
+                if self.settings.mapping.in_box(palm):
+                    self._hand = (palm, self._hand[1])
+
+    def _goal(self, mode: Mode) -> TipGoal:
+        """Return what the hand asks for under the mode; before the first hand, to stay."""
+        if self._hand is None:
+            return TipGoal(tuple(self.pose.tip.tolist()), tuple(self.pose.direction.tolist()))
+        return self.settings.mapping.goal(*self._hand, mode)
 
     def _change(self, mode: Mode) -> None:
         """On entering the fist, lock the mid point; on leaving it, turn on from where the tip points now."""

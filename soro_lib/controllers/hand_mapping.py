@@ -41,7 +41,10 @@ class PalmMapping:
     lowest, highest : float
         Heights of the allowed box above the device [m].
     maximum_tilt : float
-        Largest angle of the commanded direction from straight [rad].
+        Largest angle of the commanded direction from straight, on the axis [rad].
+    tilt_loss : float
+        How much less tilt is allowed per distance of the tip from the axis [rad/m]; 0 is one limit everywhere. The
+        arm itself loses about one degree per millimetre.
     """
 
     scale_x: float = 0.2
@@ -52,6 +55,7 @@ class PalmMapping:
     lowest: float = 0.100
     highest: float = 0.400
     maximum_tilt: float = math.radians(30.0)
+    tilt_loss: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("scale_x", "scale_y", "scale_z", "offset"):
@@ -63,6 +67,8 @@ class PalmMapping:
             raise ValueError(f"PalmMapping: 0 < lowest < highest must hold, got {self.lowest}, {self.highest}")
         if not 0 < self.maximum_tilt < math.pi / 2:
             raise ValueError(f"PalmMapping.maximum_tilt = {self.maximum_tilt}, must be in (0, pi/2)")
+        if not 0 <= self.tilt_loss < math.inf:
+            raise ValueError(f"PalmMapping.tilt_loss = {self.tilt_loss}, must be >= 0 and finite")
 
     def in_box(self, palm: Vector) -> bool:
         """Return whether the palm [m, device frame] is where the paper allows it (Section IV-A)."""
@@ -80,9 +86,18 @@ class PalmMapping:
         return x / self.scale_x, (z - self.offset) / self.scale_z, y / self.scale_y
 
     def direction(self, normal: Vector) -> Vector:
-        """Return the pointing direction that a palm normal [device frame] asks for, tilt limited."""
+        """Return the pointing direction that a palm normal [device frame] asks for."""
         x, y, z = normal
-        return limited_tilt((x, -z, -y), self.maximum_tilt)
+        return x, -z, -y
+
+    def goal(self, palm: Vector, normal: Vector, mode: Mode = Mode.PALM) -> TipGoal:
+        """Return the goal of a hand under a mode, with its tilt limited."""
+        goal = constrained_goal(mode, TipGoal(self.position(palm), self.direction(normal)))
+        return goal._replace(direction=limited_tilt(goal.direction, self.tilt_limit(goal.position)))
+
+    def tilt_limit(self, position: Vector) -> float:
+        """Return the largest tilt [rad] that is asked for at a tip position [m]."""
+        return max(self.maximum_tilt - self.tilt_loss * math.hypot(position[0], position[1]), 0.0)
 
     def normal(self, direction: Vector) -> Vector:
         """Return the palm normal [device frame] that asks for a pointing direction."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.arcs import chain_jacobian, chain_transform
+from soro_lib.arcs import backbone, chain_transform_and_jacobian
 from soro_lib.controllers.steering_step import Clearance
 from soro_lib.robots.base import Robot
 
@@ -56,21 +56,24 @@ def clearances(
     """
     pieces, slope = robot.configuration(actuation), robot.configuration_jacobian(actuation)
     body = float(getattr(robot, "outer_radius", 0.0))
+    points = backbone(pieces, points_per_piece)[1:].reshape(len(pieces), points_per_piece, 3)
     found = []
-    for piece in range(1, len(pieces)):  # piece 0 is the slide, behind the base
-        points = robot_points(pieces, piece, points_per_piece)
-        for obstacle in obstacles:
-            distance = np.linalg.norm(points - np.array(obstacle.centre), axis=1)
-            share = (int(np.argmin(distance)) + 1) / points_per_piece
+    for obstacle in obstacles:
+        distance = np.linalg.norm(points - np.array(obstacle.centre), axis=-1)
+        for piece in range(1, len(pieces)):  # piece 0 is the slide, behind the base
+            share = (int(np.argmin(distance[piece])) + 1) / points_per_piece
             found.append(_clearance(pieces, slope, piece, share, obstacle, body))
     return sorted(found, key=lambda item: item.distance - item.contact)
 
 
-def robot_points(pieces: Array, piece: int, count: int) -> Array:
-    """Return points (count, 3) [m] along one piece of a chain, its end last."""
-    chains = np.repeat(pieces[None, : piece + 1], count, axis=0)
-    chains[:, piece] *= (np.arange(1, count + 1) / count)[:, None]
-    return chain_transform(chains)[:, :3, 3]
+def smallest_clearance(
+    robot: Robot, actuations: ArrayLike, obstacle: Sphere, points_per_piece: int = 100
+) -> Array:
+    """Return the gap [m] between surfaces of arm and obstacle, negative in collision, for actuations (..., n)."""
+    pieces = robot.configuration(actuations)
+    points = backbone(pieces, points_per_piece)[..., points_per_piece:, :]  # from the base on
+    distance = np.linalg.norm(points - np.array(obstacle.centre), axis=-1).min(axis=-1)
+    return distance - obstacle.radius - float(getattr(robot, "outer_radius", 0.0))
 
 
 def _clearance(
@@ -81,7 +84,8 @@ def _clearance(
     part[piece] *= share
     part_slope = slope[: 3 * (piece + 1)].copy()
     part_slope[3 * piece :] *= share
-    offset = chain_transform(part)[:3, 3] - np.array(obstacle.centre)
+    pose, jacobian = chain_transform_and_jacobian(part)
+    offset = pose[:3, 3] - np.array(obstacle.centre)
     distance = float(np.linalg.norm(offset))
-    gradient = offset / max(distance, 1e-9) @ chain_jacobian(part)[:3] @ part_slope
+    gradient = offset / max(distance, 1e-9) @ jacobian[:3] @ part_slope
     return Clearance(distance, gradient, obstacle.radius + body)

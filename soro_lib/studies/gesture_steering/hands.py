@@ -162,12 +162,13 @@ def timeline(table: pd.DataFrame, mapping: PalmMapping | None = None) -> pd.Data
             continue
         velocity = sample.velocity if np.isfinite(sample.velocity[0]) else None
         filtered = palm_filter.update(sample.time, sample.palm, velocity)
-        direction = mapping.direction(sample.normal)
-        smooth = direction_filter.update(sample.time - last if last is not None else 1.0, direction)
-        goal, last = mapping.position(tuple(filtered)), sample.time
         mode = rule.update(sample.time, sample.fingers)
+        goal = mapping.goal(tuple(filtered), sample.normal, mode)
+        direction = goal.direction
+        smooth = direction_filter.update(sample.time - last if last is not None else 1.0, direction)
+        last = sample.time
         rows.append(
-            (sample.time - start, *np.multiply(sample.palm, 1e3), *filtered * 1e3, *np.multiply(goal, 1e3), *smooth,
+            (sample.time - start, *np.multiply(sample.palm, 1e3), *filtered * 1e3, *np.multiply(goal.position, 1e3), *smooth,
              np.degrees(np.arccos(direction[2])), np.degrees(np.arccos(min(smooth[2], 1.0))),
              "".join("1" if flag else "0" for flag in sample.fingers), mode.value)
         )  # fmt: skip

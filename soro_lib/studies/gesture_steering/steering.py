@@ -24,9 +24,9 @@ LEAD = 2.0
 """Time that a simulated operator waits at the start of a path, and that is not evaluated [s]."""
 CONTROL_PERIOD = 0.030
 """The paper's sampling time [s]."""
-HIGH_REACH = PalmMapping(scale_z=-0.05)
-"""c_z = -0.05 puts the 140 mm of Fig. 7(b) at a palm height of 200 mm. With the paper's -0.2 it is at 50 mm, below the
-allowed box (erratum GS-6)."""
+HIGH_REACH = PalmMapping(offset=0.165)
+"""The device 75 mm lower, all scales as printed. With the printed offset the 140 mm of Fig. 7(b) need a palm 50 mm above
+the device, which is outside the allowed box (erratum GS-6)."""
 
 
 @dataclass(frozen=True)
