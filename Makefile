@@ -37,7 +37,7 @@ quick: env ## run the notebooks with small parameters; writes to build/quick
 	@$(RUN) soro_lib.workbook run --quick $(RUNNER_OPTIONS)
 
 test: env ## run all tests, and every notebook with small parameters
-	@$(RUN) pytest -n auto
+	@$(RUN) pytest -n logical --dist worksteal
 
 check: env ## lint, types, and whether what is committed is what the notebooks produce
 	@$(RUN) ruff check .

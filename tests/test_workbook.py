@@ -298,6 +298,7 @@ def test_failures_are_named_kept_and_stop_nothing_else(
     write_notebook(notebooks / "04_dying.ipynb", "import os\nos._exit(1)")
     write_notebook(notebooks / "05_ageing.ipynb", "from soro_lib.ageing import old\nold()")
     write_notebook(notebooks / "06_fine.ipynb", OUTPUT)
+    write_notebook(notebooks / "07_broken.ipynb", "a = = 1")
     before = files(project / "figures")
     assert main(["run", "--jobs", "3", "--timeout", "2"], project) == 1
     out = capsys.readouterr().out
@@ -305,6 +306,7 @@ def test_failures_are_named_kept_and_stop_nothing_else(
     assert "slow: code cell 3: took longer than 2 s" in out
     assert "dying: code cell 2: the kernel died" in out
     assert "ageing: code cell 2: DeprecationWarning: old" in out
+    assert "broken: code cell 2: SyntaxError: invalid syntax" in out
     assert "fine: done" in out
     assert files(project / "figures") == before
     half = nbformat.read(project / "build" / "failed" / "02_beta.ipynb", as_version=4)
@@ -375,6 +377,12 @@ def test_figures_set_aside_by_a_killed_run_come_back(project: Path) -> None:
     (project / "figures" / "beta").rename(aside)
     recover(Places.of(project, None, quick=False, changed=False))
     assert files(project / "figures") == before
+
+
+def test_a_file_that_is_no_notebook_is_named(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (project / "notebooks" / "03_text.ipynb").write_text("no json")
+    assert main(["run"], project) == 2
+    assert "03_text.ipynb is not a notebook" in capsys.readouterr().err
 
 
 def test_list_and_html(project: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,14 +1,15 @@
 """Command line of the runner."""
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from soro_lib.project import ROOT
 from soro_lib.workbook.display import Display
+from soro_lib.workbook.execution import cores
 from soro_lib.workbook.notebooks import (
+    NotebookError,
     ParameterError,
     describe,
     find_notebooks,
@@ -35,7 +36,7 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
             print(f"open {export(notebooks, places)}")
             return 0
         return _run(options, root)
-    except (ParameterError, AlreadyRunning, FileNotFoundError) as error:
+    except (NotebookError, ParameterError, AlreadyRunning, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
 
@@ -69,9 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
     run = commands.add_parser("run", help="run the notebooks whose inputs have changed")
     run.add_argument("--only", action="append", default=[], metavar="SLUG", help="this notebook (repeatable)")
-    run.add_argument(
-        "--jobs", type=_positive, default=os.cpu_count() or 1, metavar="N", help="how many at once"
-    )
+    run.add_argument("--jobs", type=_positive, default=cores(), metavar="N", help="how many at once")
     run.add_argument(
         "-p",
         "--parameter",

@@ -5,6 +5,7 @@ import signal
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -148,7 +149,12 @@ class Engine(NBClientEngine):
 papermill_engines.register(ENGINE, Engine)
 
 
-def kernel_environment(root: Path, output: Path, figures: Path, scratch: Path) -> dict[str, str]:
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def kernel_environment(root: Path, output: Path, figures: Path, scratch: Path, jobs: int) -> dict[str, str]:
     """Return the environment that every notebook runs in, whoever runs it and wherever.
 
     Parameters
@@ -161,7 +167,10 @@ def kernel_environment(root: Path, output: Path, figures: Path, scratch: Path) -
         Folder with the finished figures of this run.
     scratch : Path
         Folder for the settings of IPython, in place of the user's own.
+    jobs : int
+        Notebooks that run at once and share the cores.
     """
+    matplotlib = Path(str(find_spec("matplotlib").origin)).parent  # type: ignore[union-attr]
     modules = (path.relative_to(root).with_suffix("") for path in sorted((root / "soro_lib").rglob("*.py")))
     names = {".".join(part for part in module.parts if part != "__init__") for module in modules}
     return {
@@ -173,7 +182,8 @@ def kernel_environment(root: Path, output: Path, figures: Path, scratch: Path) -
         "PYTHONHASHSEED": "0",
         "PYTHONWARNINGS": ",".join(f"error::DeprecationWarning:{name}" for name in sorted(names)),
         "MPLBACKEND": "Agg",
-        "MPLCONFIGDIR": str(scratch / "matplotlib"),
+        "MATPLOTLIBRC": str(matplotlib / "mpl-data" / "matplotlibrc"),
+        "LOKY_MAX_CPU_COUNT": str(max(1, cores() // jobs)),
         "IPYTHONDIR": str(scratch / "ipython"),
         "JUPYTER_PREFER_ENV_PATH": "1",
         "PYDEVD_DISABLE_FILE_VALIDATION": "1",

@@ -69,7 +69,11 @@ def data_slugs(source: str) -> frozenset[str]:
 
 
 def _parse(source: str) -> ast.Module:
-    return ast.parse(re.sub(r"^\s*[%!?].*$", "", source, flags=re.MULTILINE))
+    try:
+        return ast.parse(re.sub(r"^\s*[%!?].*$", "", source, flags=re.MULTILINE))
+    except SyntaxError:
+        # It is the run that will fail, and say where.
+        return ast.Module(body=[], type_ignores=[])
 
 
 def _bindings(tree: ast.Module, package: str) -> Iterable[tuple[str, str]]:

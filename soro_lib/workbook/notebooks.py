@@ -19,6 +19,10 @@ OVERVIEW = "overview"
 """The notebook that merges the scorecards of the others and therefore runs last."""
 
 
+class NotebookError(ValueError):
+    """A file that is named like a notebook and is none."""
+
+
 class ParameterError(ValueError):
     """A parameter that no selected notebook has, or whose value is not of its type."""
 
@@ -97,8 +101,11 @@ class Notebook:
 
     @cached_property
     def cells(self) -> list[Any]:
-        """Cells as nbformat reads them."""
-        return nbformat.read(self.path, as_version=4).cells
+        """Cells as nbformat reads them; raises `NotebookError` if they cannot be read."""
+        try:
+            return nbformat.read(self.path, as_version=4).cells
+        except Exception as error:
+            raise NotebookError(f"{self.path.name} is not a notebook: {error}") from error
 
     @property
     def code(self) -> list[str]:
@@ -117,6 +124,8 @@ class Notebook:
     @cached_property
     def parameters(self) -> dict[str, Parameter]:
         """Parameters by name, as papermill reads them from the cell tagged ``parameters``."""
+        if not self.cells:
+            raise NotebookError(f"{self.path.name} has no cells")
         return {
             name: Parameter(name, found["inferred_type_name"], found["default"], found["help"])
             for name, found in papermill.inspect_notebook(self.path).items()

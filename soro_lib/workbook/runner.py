@@ -178,7 +178,7 @@ class Run:
             notebook,
             parameters,
             copy=folder / notebook.path.name,
-            environment=kernel_environment(self.places.root, output, self.places.figures, folder),
+            environment=kernel_environment(self.places.root, output, self.places.figures, folder, self.jobs),
             working_directory=work,
             cell_timeout=self.cell_timeout,
             on_cell=lambda number: self.display.cell(notebook.slug, number),
