@@ -3,7 +3,9 @@
 import importlib
 import importlib.util
 import inspect
+import pkgutil
 import re
+from types import ModuleType
 
 import pandas as pd
 
@@ -21,8 +23,8 @@ def figure_map(slugs: tuple[str, ...]) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Columns ``paper``, ``place`` (in the paper, empty where the workbook adds something of its own), ``shows``
-        (first line of the docstring of the function that draws it) and ``file``.
+        Columns ``paper``, ``place`` in the paper (empty for what the workbook adds), ``shows`` (first line of
+        the docstring of the function that draws it) and ``file``.
     """
     rows = [
         {
@@ -43,19 +45,26 @@ def place_in_paper(name: str) -> str:
 
     Examples
     --------
-    >>> place_in_paper("fig07a_infinity_path"), place_in_paper("table2_configurations"), place_in_paper("arms")
-    ('Fig. 7a', 'Table 2', '')
+    >>> [place_in_paper(name) for name in ("fig07a_infinity_path", "table2_configurations", "four_arms")]
+    ['Fig. 7a', 'Table 2', '']
     """
     match = re.match(r"(fig|table)0*(\d+[a-z]?)(_|$)", name)
     return f"{'Fig.' if match[1] == 'fig' else 'Table'} {match[2]}" if match else ""
 
 
 def _shows(slug: str, name: str) -> str:
-    """Return the first line of what draws the figure; the name in words where it has no function of its own."""
-    module = f"soro_lib.reporting.figures.{slug}"
-    function = None
-    if importlib.util.find_spec(module):
-        function = getattr(importlib.import_module(module), name, None)
-    text = inspect.getdoc(function) if function else None
+    """Return the first line of what draws the figure, or its name in words where nothing has that name."""
+    functions = [getattr(module, name) for module in _figure_modules(slug) if hasattr(module, name)]
+    text = inspect.getdoc(functions[0]) if functions else None
     words = re.sub(r"^(fig|table)\w*?_", "", name).replace("_", " ")
     return text.splitlines()[0].rstrip(".") if text else words
+
+
+def _figure_modules(slug: str) -> list[ModuleType]:
+    """Return the module that draws the figures of a notebook, and those inside it where it is a package."""
+    name = f"soro_lib.reporting.figures.{slug}"
+    if importlib.util.find_spec(name) is None:
+        return []
+    module = importlib.import_module(name)
+    inside = pkgutil.iter_modules(getattr(module, "__path__", []))
+    return [module, *(importlib.import_module(f"{name}.{item.name}") for item in inside)]

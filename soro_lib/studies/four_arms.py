@@ -42,7 +42,7 @@ class Specimen:
     end: tuple[float, ...]
 
     def pieces(self, actuation: ArrayLike) -> NDArray[np.float64]:
-        """Return the centre lines of its pieces [m] in the base frame, shape (pieces, POINTS_PER_PIECE + 1, 3)."""
+        """Return the centre lines of its pieces [m], base frame, shape (pieces, POINTS_PER_PIECE + 1, 3)."""
         points = self.robot.backbone(actuation, POINTS_PER_PIECE)
         first = np.arange(0, len(points) - 1, POINTS_PER_PIECE)
         lines: NDArray[np.float64] = points[first[:, np.newaxis] + np.arange(POINTS_PER_PIECE + 1)]

@@ -15,7 +15,7 @@ DISPLAY_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / np.pi), "-N": ("-N", 1
 """How an actuator's unit is shown: unit and factor."""
 
 SLIDER_STEPS = 200
-"""Steps from one end of a slider to the other [count]."""
+"""Steps from one end of a slider to the other, about [count]."""
 
 
 class ArmExplorer(ipywidgets.VBox):
@@ -41,7 +41,7 @@ class ArmExplorer(ipywidgets.VBox):
         self.home_button = ipywidgets.Button(description="home", icon="home", layout={"width": "90px"})
         self.message = ipywidgets.HTML()
         self.view = ArmView(layout={"flex": "1 1 420px", "min_width": "320px"})
-        self.controls = ipywidgets.VBox(layout={"flex": "0 0 370px"})
+        self.controls = ipywidgets.VBox(layout={"flex": "0 0 380px"})
         self.sliders: list[ipywidgets.FloatSlider] = []
         self.choice.observe(lambda _: self._choose(), "value")
         self.home_button.on_click(lambda _: self._go(self.specimen.robot.home))
@@ -72,11 +72,11 @@ class ArmExplorer(ipywidgets.VBox):
                 description=f"{name} [{unit}]",
                 min=low,
                 max=high,
-                step=(high - low) / SLIDER_STEPS,
+                step=_round_number((high - low) / SLIDER_STEPS),
                 value=value,
                 readout_format=".1f",
-                style={"description_width": "105px"},
-                layout={"width": "360px"},
+                style={"description_width": "118px"},
+                layout={"width": "370px"},
             )
             for name, unit, low, high, value in zip(
                 names,
@@ -115,7 +115,7 @@ class ArmExplorer(ipywidgets.VBox):
             self._low,
             self._high,
             hangs=specimen.hangs,
-            grid=_grid_spacing(float(np.max(self._high - self._low))),
+            grid=_round_number(float(np.max(self._high - self._low)) / 8.0),
             caption=f"{specimen.name} arm, tip at ({x:.1f}, {y:.1f}, {z:.1f}) mm",
         )
 
@@ -134,8 +134,13 @@ def _name_and_unit(actuator_name: str) -> tuple[str, str]:
     return name, unit
 
 
-def _grid_spacing(extent: float) -> float:
-    """Return a round spacing that puts about eight lines across the extent [m]."""
-    rough = extent / 8.0
-    power = 10.0 ** np.floor(np.log10(rough))
-    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(step * power - rough)) * power)
+def _round_number(value: float) -> float:
+    """Return the nearest of 1, 2, 5 or 10 times a power of ten.
+
+    Examples
+    --------
+    >>> _round_number(0.45), _round_number(9.9)
+    (0.5, 10.0)
+    """
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda factor: abs(factor * power - value)) * power)

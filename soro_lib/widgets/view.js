@@ -14,7 +14,7 @@ function mix(hex, other, share) {
 function camera(scene, view, width, height) {
   const centre = scene.low.map((low, i) => (low + scene.high[i]) / 2);
   const radius = Math.hypot(...scene.low.map((low, i) => scene.high[i] - low)) / 2;
-  const scale = (view.zoom * Math.min(width, height * 1.15)) / (2.15 * radius);
+  const scale = (view.zoom * Math.min(width, height * 1.15)) / (1.75 * radius);
   const [ca, sa] = [Math.cos(view.azimuth), Math.sin(view.azimuth)];
   const [ce, se] = [Math.cos(view.elevation), Math.sin(view.elevation)];
   const project = (point) => {
@@ -92,29 +92,25 @@ function drawBase(context, scene, project) {
 function drawPiece(context, { from, to, radius, color }) {
   const [dx, dy] = [to.x - from.x, to.y - from.y];
   const length = Math.hypot(dx, dy);
-  const half = radius * to.scale;
-  context.fillStyle = mix(color, "#000000", 0.12);
-  context.beginPath();
-  context.arc(to.x, to.y, half, 0, 2 * Math.PI);
-  context.fill();
-  if (length < 1e-6) return;
+  const [near, half] = [radius * from.scale, radius * to.scale];
   // The light comes from the upper left: the bright line lies on that side of the tube.
-  let [nx, ny] = [-dy / length, dx / length];
+  let [nx, ny] = length > 1e-6 ? [-dy / length, dx / length] : [-0.6, -0.8];
   if (nx + ny > 0) [nx, ny] = [-nx, -ny];
   const gradient = context.createLinearGradient(
     from.x + nx * half, from.y + ny * half, from.x - nx * half, from.y - ny * half);
   gradient.addColorStop(0, mix(color, "#000000", 0.25));
-  gradient.addColorStop(0.3, mix(color, "#ffffff", 0.55));
+  gradient.addColorStop(0.3, mix(color, "#ffffff", 0.5));
   gradient.addColorStop(0.55, color);
   gradient.addColorStop(1, mix(color, "#000000", 0.5));
-  const [ex, ey] = [(dx / length) * 0.6, (dy / length) * 0.6];
-  const near = radius * from.scale;
   context.fillStyle = gradient;
   context.beginPath();
-  context.moveTo(from.x - ex + nx * near, from.y - ey + ny * near);
-  context.lineTo(to.x + ex + nx * half, to.y + ey + ny * half);
-  context.lineTo(to.x + ex - nx * half, to.y + ey - ny * half);
-  context.lineTo(from.x - ex - nx * near, from.y - ey - ny * near);
+  context.moveTo(from.x + nx * near, from.y + ny * near);
+  context.lineTo(to.x + nx * half, to.y + ny * half);
+  context.lineTo(to.x - nx * half, to.y - ny * half);
+  context.lineTo(from.x - nx * near, from.y - ny * near);
+  context.fill();
+  context.beginPath();
+  context.arc(to.x, to.y, half, 0, 2 * Math.PI);
   context.fill();
 }
 
@@ -134,8 +130,9 @@ function drawTip(context, scene, project) {
   const pose = scene.tip;
   const origin = pose.slice(0, 3).map((row) => row[3]);
   const start = project(origin);
+  const length = Math.max(scene.grid * 0.6, 2.5 * scene.tubes[0].radius);
   AXES.forEach((color, axis) => {
-    const end = project(origin.map((value, i) => value + pose[i][axis] * scene.grid * 0.5));
+    const end = project(origin.map((value, i) => value + pose[i][axis] * length));
     line(context, start, end, color, 2.5);
     context.fillStyle = color;
     context.font = "600 12px sans-serif";

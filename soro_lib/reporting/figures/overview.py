@@ -51,7 +51,7 @@ def draw_arm(axes: Any, specimen: Specimen, actuation: ArrayLike, strength: floa
 
 
 def _shaded(color: str, shade: float, strength: float) -> tuple[float, ...]:
-    """Return the colour darker (shade < 1) or lighter (> 1), mixed with white where the strength is below 1."""
+    """Return the colour darker (shade < 1) or lighter (> 1), mixed with white below a strength of 1."""
     rgb = np.array(to_rgb(color))
     lit = rgb * shade if shade <= 1.0 else rgb + (1.0 - rgb) * (shade - 1.0)
     return tuple(float(value) for value in 1.0 - strength * (1.0 - lit))
