@@ -2,7 +2,8 @@
 
 An operator sees a delayed picture and misjudges depth along the line of sight; corrects in single
 submovements with a refractory pause; holds the device with a compliant hand; and presses the button when the
-tip has looked right for a while. The attitude to a guidance force is an open factor: ignore it, use it as a cue, or yield.
+tip has looked right for a while. The attitude to a guidance force is an open factor: ignore it, use it as a
+cue, or yield.
 
 The rules are functions of plain numbers, compiled by the simulator. Lengths are metres at the tip unless
 called hand; base frame of the robot, z down; one call per 10 ms.

@@ -12,7 +12,7 @@ from soro_lib.operators.decision import DECIDED_NOTHING, Decision, decide
 from soro_lib.operators.hand import Hand, Movement, hand_step, intend, plan_submovement
 from soro_lib.operators.people import DEVICE_SCALE, SAMPLE_TIME, Operator, Vector
 
-RESTING_SPEED = 0.002
+RESTING_SPEED = 0.02
 """Speed below which a tip looks at rest [m/s]."""
 
 RESIGNED_OFFSET = 0.05

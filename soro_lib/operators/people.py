@@ -61,8 +61,8 @@ class Operator:
     learn : float
         Share of the bias removed by a failed grasp [-].
     resignation : float
-        Where the machine steers: time a resting tip is watched before the button is pressed although the place
-        looks slightly wrong [s]; assumption, 3 s.
+        Where the machine steers: time a resting tip is watched before the button is pressed although the
+        place looks slightly wrong [s]; assumption, 3 s.
     hand_mass, hand_damping, hand_stiffness : float
         Hand with device [kg, N s/m, N/m]; van Beek et al. 2015.
     device_friction : float

@@ -15,6 +15,14 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.robots.soft_growing import (
+    eversion_length,
+    eversion_proxy,
+    redistribute_actuation,
+    redistribution_required,
+    steering_coordinates,
+)
+
 Vector = tuple[float, float, float]
 
 SAMPLE_TIME = 0.01
@@ -169,6 +177,44 @@ def plant_start(tip: Vector) -> PlantState:
     return PlantState(tip, tip[0] / length, tip[1] / length, 0.0, 0.0, 0.0, 0.0, length, 0.0, 0)
 
 
+def control_error(
+    actual: ArrayLike, desired: ArrayLike, previous_steering: ArrayLike = (0.0, 0.0, 0.0)
+) -> tuple[NDArray[np.float64], float]:
+    """Error psi of the closed loop: steering commands as angles and growth (supplement, Section 4).
+
+    The proxy of Eqs. (6), (7) is taken relative to the tip, put in motor space, redistributed by Eq. (9)
+    where the rule (10) asks for it, and divided by the length (small angles; the paper prints no formula).
+
+    Parameters
+    ----------
+    actual, desired : array_like
+        (3,) tip and desired position, base frame [m].
+    previous_steering : array_like
+        (3,) steering commands of the last period, before redistribution [m].
+
+    Returns
+    -------
+    steering : numpy.ndarray
+        (3,) rotation commands of the three motors [rad], positive pulls.
+    growth : float
+        L_d - L_a [m].
+
+    Raises
+    ------
+    ValueError
+        If a position is malformed, or at the base, where no direction exists.
+    """
+    tip = np.array(finite_point("actual", actual))
+    aim = np.array(finite_point("desired", desired))
+    length = float(eversion_length(tip))
+    if length == 0:
+        raise ValueError("actual must not be the base: the body has no direction there")
+    steering = steering_coordinates((eversion_proxy(tip, aim) - tip)[:2])
+    if redistribution_required(previous_steering, steering):
+        steering = redistribute_actuation(steering)
+    return steering / length, float(eversion_length(aim)) - length
+
+
 @register_jitable
 def simulated_tip(tip: Vector, desired: Vector, lag: float) -> Vector:
     """One period of the simulator's first-order tip, exact for the authors' step of 1 % per 10 ms."""
@@ -188,7 +234,7 @@ def eversion_command(gain: float, feed_forward: float, length_error: float) -> f
 
 @register_jitable
 def steering_command(gain: float, damping: float, length: float, error: float, error_rate: float) -> float:
-    """Commanded steering rate [1/s]: proportional-derivative, gains scaled with the length (supplement, 5)."""
+    """Commanded steering rate [1/s]: proportional-derivative, scaled with the length (supplement, 5)."""
     return length / REFERENCE_LENGTH * (gain * error + damping * error_rate)
 
 
@@ -397,4 +443,4 @@ def gripper_step(
             waiting += rng.exponential(rule.mean_extra)
     if waiting <= SAMPLE_TIME / 2:
         return GripperState(NOTHING, -1.0)
-    return GripperState(state.item, waiting - SAMPLE_TIME)
+    return GripperState(state.item, max(waiting - SAMPLE_TIME, 0.0))
