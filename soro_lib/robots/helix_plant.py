@@ -13,7 +13,7 @@ spring.
 """
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
@@ -37,8 +37,11 @@ LUMPS = 3
 LONGEST_NEWTON_STEP = 0.15
 """Longest Newton step, in rad and 0.1 m; longer ones jump to folded shapes."""
 
-EQUILIBRIUM_TOLERANCE = 1e-9
+EQUILIBRIUM_TOLERANCE = 1e-8
 """Newton step below which the shape is at rest, in rad and 0.1 m."""
+
+ENERGY_ROUNDING = 1e-12
+"""Increase of the energy that may be rounding [J]."""
 
 
 @dataclass(frozen=True)
@@ -242,59 +245,49 @@ class ElasticPlant:
         command = np.asarray(tendon_lengths, dtype=float)
         self._realised = np.clip(self._realised, command - self.play, command + self.play)
         lengths = np.asarray(self.arm.rest_lengths)
-        free = np.stack([np.zeros(3), np.zeros(3), self.free_length * lengths], axis=-1).ravel()
-        state, at_rest = equilibrium(
-            self._state,
-            self._realised,
-            self._tendon_map,
-            self.tendon_stiffness,
-            self.stiffness.diagonal(self.arm),
-            free,
-            self.linear_density * lengths,
-            self.gripper_mass + self._payload,
-            self.gripper_mass_distance,
-            hand.points if hand else np.zeros(6),
-            hand.stiffness if hand else 0.0,
-            self.arm.gripper_length,
+        arm = LoadedArm(
+            tendons=self._realised,
+            tendon_map=self._tendon_map,
+            tendon_stiffness=self.tendon_stiffness,
+            stiffness=self.stiffness.diagonal(self.arm),
+            free=np.stack([np.zeros(3), np.zeros(3), self.free_length * lengths], axis=-1).ravel(),
+            masses=self.linear_density * lengths,
+            tip_mass=self.gripper_mass + self._payload,
+            tip_distance=self.gripper_mass_distance,
+            held=hand.points if hand else np.zeros(6),
+            grip=hand.stiffness if hand else 0.0,
+            gripper_length=self.arm.gripper_length,
         )
+        state, at_rest = equilibrium(self._state, arm)
         if not at_rest:
             raise RuntimeError("the elastic arm found no equilibrium for these tendon lengths")
         self._state = state
         return state.copy()
 
 
+class LoadedArm(NamedTuple):
+    """What the energy of plant E depends on besides its state; arrays in SI units, see `ElasticPlant`."""
+
+    tendons: NDArray[np.float64]
+    tendon_map: NDArray[np.float64]
+    tendon_stiffness: float
+    stiffness: NDArray[np.float64]
+    free: NDArray[np.float64]
+    masses: NDArray[np.float64]
+    tip_mass: float
+    tip_distance: float
+    held: NDArray[np.float64]
+    grip: float
+    gripper_length: float
+
+
 @njit(cache=True)
-def equilibrium(
-    q,
-    tendons,
-    tendon_map,
-    tendon_stiffness,
-    stiffness,
-    free,
-    masses,
-    tip_mass,
-    tip_distance,
-    held,
-    grip,
-    gripper_length,
-):
+def equilibrium(q, arm):
     """Return the state of least energy near q and whether the search came to rest (damped Newton)."""
     scale = np.array([1.0, 1.0, 0.1] * 3)
-    for _ in range(200):
-        gradient, hessian = energy_slopes(
-            q,
-            tendons,
-            tendon_map,
-            tendon_stiffness,
-            stiffness,
-            free,
-            masses,
-            tip_mass,
-            tip_distance,
-            held,
-            grip,
-            gripper_length,
-        )
+    energy = potential_energy(q, arm)
+    for _ in range(1000):
+        gradient, hessian = energy_slopes(q, arm)
         scaled_hessian = hessian * np.outer(scale, scale)
         shift = 0.0
         factor = cholesky(scaled_hessian)
@@ -303,46 +296,52 @@ def equilibrium(
             factor = cholesky(scaled_hessian + shift * np.eye(9))
         step = -cholesky_solve(factor, scale * gradient)
         length = np.sqrt((step**2).sum())
-        q = q + min(1.0, LONGEST_NEWTON_STEP / length) * scale * step
         if length < EQUILIBRIUM_TOLERANCE:
             return q, True
-    return q, False
+        share = min(1.0, LONGEST_NEWTON_STEP / length)
+        new_energy = potential_energy(q + share * scale * step, arm)
+        while new_energy > energy + ENERGY_ROUNDING and share * length > EQUILIBRIUM_TOLERANCE:
+            share /= 2
+            new_energy = potential_energy(q + share * scale * step, arm)
+        q = q + share * scale * step
+        energy = new_energy
+    return q, length < 1e3 * EQUILIBRIUM_TOLERANCE
 
 
 @njit(cache=True)
-def energy_slopes(
-    q,
-    tendons,
-    tendon_map,
-    tendon_stiffness,
-    stiffness,
-    free,
-    masses,
-    tip_mass,
-    tip_distance,
-    held,
-    grip,
-    gripper_length,
-):
-    """Return gradient (9,) and Hessian (9, 9) of the energy; gravity's curvature by differences."""
-    gradient = stiffness * (q - free)
-    hessian = np.diag(stiffness)
-    stretch = multiply(tendon_map, q) - tendons
+def potential_energy(q, arm):
+    """Return the energy [J] of gravity, bending, stretching, tendons and holding hand."""
+    stretch = np.maximum(multiply(arm.tendon_map, q) - arm.tendons, 0.0)
+    moment, _ = depth_moment(q, arm.masses, LUMPS, arm.tip_mass, arm.tip_distance)
+    energy = 0.5 * (arm.stiffness * (q - arm.free) ** 2).sum() - GRAVITY * moment
+    energy += 0.5 * arm.tendon_stiffness * (stretch**2).sum()
+    if arm.grip > 0:
+        points, _ = tip_points_and_jacobian(q, arm.gripper_length)
+        energy += 0.5 * arm.grip * ((points - arm.held) ** 2).sum()
+    return energy
+
+
+@njit(cache=True)
+def energy_slopes(q, arm):
+    """Return gradient (9,) and Hessian (9, 9) of `potential_energy`; gravity's curvature by differences."""
+    gradient = arm.stiffness * (q - arm.free)
+    hessian = np.diag(arm.stiffness)
+    stretch = multiply(arm.tendon_map, q) - arm.tendons
     for k in range(9):
         if stretch[k] > 0:
-            gradient += tendon_stiffness * stretch[k] * tendon_map[k]
-            hessian += tendon_stiffness * np.outer(tendon_map[k], tendon_map[k])
-    fall = depth_moment(q, masses, LUMPS, tip_mass, tip_distance)[1]
+            gradient += arm.tendon_stiffness * stretch[k] * arm.tendon_map[k]
+            hessian += arm.tendon_stiffness * np.outer(arm.tendon_map[k], arm.tendon_map[k])
+    _, fall = depth_moment(q, arm.masses, LUMPS, arm.tip_mass, arm.tip_distance)
     gradient -= GRAVITY * fall
     for j in range(9):
         nudge = np.zeros(9)
         nudge[j] = 1e-7
-        ahead = depth_moment(q + nudge, masses, LUMPS, tip_mass, tip_distance)[1]
+        _, ahead = depth_moment(q + nudge, arm.masses, LUMPS, arm.tip_mass, arm.tip_distance)
         hessian[:, j] -= GRAVITY * (ahead - fall) / nudge[j]
-    if grip > 0:
-        points, jacobian = tip_points_and_jacobian(q, gripper_length)
-        gradient += grip * multiply(jacobian.T, points - held)
-        hessian += grip * jacobian.T @ jacobian
+    if arm.grip > 0:
+        points, jacobian = tip_points_and_jacobian(q, arm.gripper_length)
+        gradient += arm.grip * multiply(jacobian.T, points - arm.held)
+        hessian += arm.grip * jacobian.T @ jacobian
     return gradient, 0.5 * (hessian + hessian.T)
 
 

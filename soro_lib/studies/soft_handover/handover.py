@@ -4,7 +4,7 @@ A run looks, decides and moves, step by step, until the gripper closes or the ar
 by the true ball in the true gripper, never by what the filters believe. Frame `arm_base`, z down.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from soro_lib.controllers.handover import UP, HandoverController, HandoverParameters, Mode
+from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
 from soro_lib.robots.helix_plant import Gripper, Hand, HelixPlant
 from soro_lib.sensing.handover_observation import Observer
 
@@ -76,6 +77,8 @@ class HandoverRun:
         Farthest that the true gripper went past the ball, sideways [m].
     state, ball : ndarray
         True state (9,) and true ball (3,) at the end.
+    states, commands, estimates : ndarray, shape (steps + 1, 9)
+        True, commanded and estimated state at every look; NaN where nothing was estimated.
     trace : dict of str to ndarray
         One entry per step; see `TRACE_COLUMNS`.
     """
@@ -88,6 +91,9 @@ class HandoverRun:
     lateral_overshoot: float
     state: NDArray[np.float64]
     ball: NDArray[np.float64]
+    states: NDArray[np.float64]
+    commands: NDArray[np.float64]
+    estimates: NDArray[np.float64]
     trace: dict[str, NDArray[np.float64]]
 
 
@@ -100,6 +106,8 @@ TRACE_COLUMNS = (
     "estimated_gap_mm",
     "estimate_residual_mm",
     "miss_mm",
+    "true_mm",
+    "descending",
 )
 """Error to the goal (six numbers together); then, for the gripper point: distance of the measured, commanded
 (``q_sys``) and estimated (``q_est``) one from the calibrated place, gaps of the last two to the measured
@@ -149,6 +157,7 @@ def run_handover(
     state = plant.settle(motors.pull(np.zeros(9)))
     sway = np.zeros(3)
     rows = []
+    shapes = []
     overshoot = -np.inf
     away = (ball - calibrated)[:2] / np.linalg.norm((ball - calibrated)[:2])
     for step in range(step_limit):
@@ -160,9 +169,9 @@ def run_handover(
         miss = float(np.linalg.norm(points[3:] - held_ball))
         overshoot = max(overshoot, float((points[3:5] - held_ball[:2]) @ away))
         commanded = arm.tip_points(command.q_sys)[3:]
-        estimated = np.full(3, np.nan)
-        if command.q_est is not None:
-            estimated = arm.tip_points(command.q_est)[3:]
+        q_est = np.full(9, np.nan) if command.q_est is None else command.q_est
+        estimated = np.full(3, np.nan) if command.q_est is None else arm.tip_points(q_est)[3:]
+        shapes.append((state, command.q_sys, q_est))
         measured = command.measured_points[3:]
         rows.append(
             (
@@ -174,6 +183,8 @@ def run_handover(
                 np.linalg.norm(estimated - measured),
                 command.estimate_residual,
                 miss,
+                np.linalg.norm(points[3:] - calibrated),
+                command.mode in (Mode.DESCEND, Mode.GRASP),
             )
         )
         if command.mode in (Mode.GRASP, Mode.STOPPED):
@@ -181,8 +192,20 @@ def run_handover(
         hand = guide(step, points[3:], held_ball) if guide else None
         state = plant.settle(motors.pull(command.tendon_change), hand)
     success = command.mode is Mode.GRASP and gripper.holds(points, held_ball)
-    trace = dict(zip(TRACE_COLUMNS, 1e3 * np.array(rows).T))
-    return HandoverRun(step, command.mode, command.reason, success, miss, overshoot, state, held_ball, trace)
+    unit = np.array([1.0 if name == "descending" else 1e3 for name in TRACE_COLUMNS])
+    trace = dict(zip(TRACE_COLUMNS, (unit * np.array(rows, dtype=float)).T))
+    return HandoverRun(
+        step,
+        command.mode,
+        command.reason,
+        success,
+        miss,
+        overshoot,
+        state,
+        held_ball,
+        *np.array(shapes).swapaxes(0, 1),
+        trace,
+    )
 
 
 def handovers(
@@ -248,3 +271,76 @@ def handovers(
         )
         traces.append(pd.DataFrame({**identity, "step": np.arange(result.steps + 1), **result.trace}))
     return pd.DataFrame(runs), pd.concat(traces, ignore_index=True)
+
+
+def thesis_parameters(step_size: float = 0.1, **control: object) -> HandoverParameters:
+    """Return the thesis's settings for a step size; further arguments go to `VirtualStiffnessController`."""
+    return HandoverParameters(control=VirtualStiffnessController(step_size=step_size, **control))  # type: ignore[arg-type]
+
+
+def step_size_experiment(
+    plants: Mapping[str, HelixPlant],
+    observer: Observer,
+    step_sizes: Sequence[float],
+    repetitions: int,
+    seed: int,
+    *,
+    guide: Guide | None = None,
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return runs and traces of experiment 1, or of experiment 2 with a guide, on every plant and at every
+    step size."""
+    runs, traces = [], []
+    for name, plant in plants.items():
+        for step_size in step_sizes:
+            run, trace = handovers(
+                thesis_parameters(step_size),
+                plant,
+                observer,
+                repetitions,
+                seed,
+                guide=guide,
+                plant=name,
+                alpha=step_size,
+            )
+            runs.append(run)
+            traces.append(trace)
+    return pd.concat(runs, ignore_index=True), pd.concat(traces, ignore_index=True)
+
+
+def block_times(runs: pd.DataFrame, timestep: Mapping[float, float]) -> pd.DataFrame:
+    """Return the statistics of Table 1 for every block of eight runs.
+
+    Parameters
+    ----------
+    runs : DataFrame
+        Of :func:`step_size_experiment`.
+    timestep : mapping of float to float
+        Duration of a step [s] by step size: the thesis's, a declared input.
+
+    Returns
+    -------
+    DataFrame
+        plant, alpha, block, min_s, median_s, max_s, mean_s, sd_s, successes.
+    """
+    timed = runs.assign(time_s=runs["steps"] * runs["alpha"].map(dict(timestep)))
+    groups = timed.groupby(["plant", "alpha", "block"], sort=False)
+    times = groups["time_s"].agg(["min", "median", "max", "mean", "std"])
+    times.columns = ["min_s", "median_s", "max_s", "mean_s", "sd_s"]
+    return times.assign(successes=groups["success"].sum()).reset_index()
+
+
+def success_over_opening(
+    runs: pd.DataFrame, openings: Sequence[float] = (0.02, 0.025, 0.03, 0.035, 0.04, 0.045, 0.05, 0.06)
+) -> pd.DataFrame:
+    """Return the success rate for grippers that catch a ball within each distance [m] of the gripper point.
+
+    The thesis does not print the opening of its gripper; its threshold lets the arm stop 35 mm away.
+    """
+    rows = []
+    for (plant, alpha), group in runs.groupby(["plant", "alpha"], sort=False):
+        for opening in openings:
+            caught = group["closed"] & (group["miss_mm"] <= 1e3 * opening)
+            rows.append(
+                {"plant": plant, "alpha": alpha, "opening_mm": 1e3 * opening, "success": caught.mean()}
+            )
+    return pd.DataFrame(rows)

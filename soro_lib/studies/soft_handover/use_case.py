@@ -90,6 +90,7 @@ def use_cases(
     observer: Observer,
     repetitions: int,
     seed: int,
+    /,
     *,
     scene: Scene | None = None,
     bowl: Bowl | None = None,

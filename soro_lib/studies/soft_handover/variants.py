@@ -14,12 +14,12 @@ import numpy as np
 import pandas as pd
 
 from soro_lib.controllers.handover import HandoverController, HandoverParameters, SafetyRules
-from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController, state_limits
+from soro_lib.controllers.virtual_stiffness import state_limits
 from soro_lib.estimators.handover_filters import APPENDIX_A, FilterNoise, FilterParameters
 from soro_lib.estimators.shape_estimation import estimate_shape
 from soro_lib.robots.helix_plant import HelixPlant
 from soro_lib.sensing.handover_observation import NO_NOISE, NoisyObserver, Observer
-from soro_lib.studies.soft_handover.handover import Scene, handovers, run_handover
+from soro_lib.studies.soft_handover.handover import Scene, handovers, run_handover, thesis_parameters
 
 UNWATCHED = SafetyRules(frozen_looks=10**9, patience=10**9)
 """Safety rules that let a loop stall for as long as it wants."""
@@ -29,11 +29,6 @@ STILL = Scene(placement_deviation=0.0, sway=0.0)
 
 NO_FILTER = FilterParameters(*[FilterNoise(1.0, 1e-12)] * 3)
 """Filters that take every measurement as it is."""
-
-
-def thesis_parameters(step_size: float = 0.1, **control: object) -> HandoverParameters:
-    """Return the thesis's settings for a step size; further arguments go to `VirtualStiffnessController`."""
-    return HandoverParameters(control=VirtualStiffnessController(step_size=step_size, **control))  # type: ignore[arg-type]
 
 
 def loop_variants(step_size: float) -> dict[str, HandoverParameters]:
