@@ -1,8 +1,8 @@
 """Declared calibration: the poses of Table II of Lai et al., and the actuations fitted to them.
 
-The paper prints where base, mid and tip of four configurations were in simulation and in the experiment, but not the
-seven actuator values. They are fitted here, openly; what follows from them about the simulated positions counts as
-calibrated, never as reproduced.
+The paper prints where base, mid and tip of four configurations were in simulation and in the experiment, but
+not the seven actuator values. They are fitted here, openly; what follows from them about the simulated
+positions counts as calibrated, never as reproduced.
 """
 
 from __future__ import annotations
@@ -82,7 +82,11 @@ def fitted_pose(
     actuation = min(fits, key=lambda fit: fit.cost).x
     pose = kinematics(actuation)
     return FittedPose(
-        actuation, pose.mid, pose.tip, float(np.linalg.norm(pose.mid - mid)), float(np.linalg.norm(pose.tip - tip))
+        actuation,
+        pose.mid,
+        pose.tip,
+        float(np.linalg.norm(pose.mid - mid)),
+        float(np.linalg.norm(pose.tip - tip)),
     )
 
 

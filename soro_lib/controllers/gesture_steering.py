@@ -1,14 +1,14 @@
 """Steering a redundant soft arm with one hand; Lai et al., Algorithm 1.
 
-Each frame of the tracker goes through gate, filter, gesture rule, mapping and one small quadratic program; out comes an
-actuation that is always valid, whatever the tracker says.
+Each frame of the tracker goes through gate, filter, gesture rule, mapping and one small quadratic program;
+out comes an actuation that is always valid, whatever the tracker says.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -90,13 +90,22 @@ class SteeringSettings:
     margin: float | None = None
 
     def __post_init__(self) -> None:
-        positive = ("direction_time_constant", "tip_speed", "turn_rate", "cable_rate", "slide_speed", "longest_interval")
+        positive = (
+            "direction_time_constant",
+            "tip_speed",
+            "turn_rate",
+            "cable_rate",
+            "slide_speed",
+            "longest_interval",
+        )
         for name in (*positive, "iterations"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"SteeringSettings.{name} = {value}, must be finite and > 0")
         if not 0 <= self.minimum_tension < 1:
-            raise ValueError(f"SteeringSettings.minimum_tension = {self.minimum_tension}, must be in [0, 1) N")
+            raise ValueError(
+                f"SteeringSettings.minimum_tension = {self.minimum_tension}, must be in [0, 1) N"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,9 +172,8 @@ class GestureSteering:
     Examples
     --------
     >>> steering = GestureSteering(CableDrivenArm())
-    >>> flat = HandSample(time=0.0, hand_id=1, palm=(0.0, 0.2, 0.0), normal=(0.0, -1.0, 0.0), fingers=(True,) * 5)
-    >>> steering.update(flat).mode.value
-    'palm'
+    >>> flat = HandSample(time=0.0, hand_id=1, palm=(0.0, 0.2, 0.0), normal=(0.0, -1.0, 0.0), fingers=(True,)
+    * 5) >>> steering.update(flat).mode.value 'palm'
     """
 
     def __init__(
@@ -259,7 +267,9 @@ class GestureSteering:
 
     def _approached(self, goal: TipGoal, interval: float) -> Array:
         """Move the target towards the goal no faster than the tip may move."""
-        return self._target + _shortened(np.subtract(goal.position, self._target), self.settings.tip_speed * interval)
+        return self._target + _shortened(
+            np.subtract(goal.position, self._target), self.settings.tip_speed * interval
+        )
 
     def _stepped(self, mode: Mode, interval: float) -> Step:
         """Solve for the step of the actuation and take it."""
@@ -280,10 +290,14 @@ class GestureSteering:
         direction_step = _shortened(self._direction.direction - pose.direction, settings.turn_rate * interval)
         if mode is Mode.FIST:
             mid_step = self._locked_mid - pose.mid
-            problem = locked_step(pose, position_step, mid_step, direction_step, lower, upper, settings.weights)
+            problem = locked_step(
+                pose, position_step, mid_step, direction_step, lower, upper, settings.weights
+            )
         elif settings.obstacles:
             near = clearances(self.robot, self.actuation, settings.obstacles)
-            problem = avoiding_step(pose, position_step, near, lower, upper, settings.weights, settings.margin)
+            problem = avoiding_step(
+                pose, position_step, near, lower, upper, settings.weights, settings.margin
+            )
         else:
             problem = pose_step(pose, position_step, direction_step, lower, upper, settings.weights)
         return solve(problem)

@@ -36,10 +36,10 @@ def gesture_count(fingers: int = 5) -> int:
 class GestureRule:
     """Decide the mode from finger vectors that flicker.
 
-    Fingers never switch together: most changes pass through vectors that mean something else. So a new mode is taken
-    only when its vector has stood for a hold time; unknown vectors keep the mode. Fist and thumbs-up, which
-    the tracker confuses and which mean opposite things, need a longer hold between each other. A pause in the
-    stream as long as the hold starts the count anew.
+    Fingers never switch together: most changes pass through vectors that mean something else. So a new mode
+    is taken only when its vector has stood for a hold time; unknown vectors keep the mode. Fist and
+    thumbs-up, which the tracker confuses and which mean opposite things, need a longer hold between each
+    other. A pause in the stream as long as the hold starts the count anew.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
 """Which frames of the tracker to believe.
 
 An optical tracker loses hands, mixes them up, turns palms over for a frame and repeats time stamps. The gate
-passes what is sound and names what is not; the controller then keeps its last valid input (Lai et al., Section IV-A).
+passes what is sound and names what is not; the controller then keeps its last valid input (Lai et al.,
+Section IV-A).
 """
 
 from __future__ import annotations

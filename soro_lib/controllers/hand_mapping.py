@@ -25,10 +25,10 @@ class TipGoal(NamedTuple):
 class PalmMapping:
     """The scaling of hand motion, Gamma in Lai et al., Eq. (4).
 
-    Read per axis (erratum GS-5), (4) scales the palm position by (c_x, c_y, 150/z_P + c_z) in mm, so that the height
-    becomes ``offset + c_z * height``: a higher hand means a shorter reach. The paper's z_P is the device's
-    height y, its y_P the device's z (erratum GS-6). The palm normal goes through the same signed permutation
-    as the position (erratum GS-7), so that a flat palm means a straight arm.
+    Read per axis (erratum GS-5), (4) scales the palm position by (c_x, c_y, 150/z_P + c_z) in mm, so that the
+    height becomes ``offset + c_z * height``: a higher hand means a shorter reach. The paper's z_P is the
+    device's height y, its y_P the device's z (erratum GS-6). The palm normal goes through the same signed
+    permutation as the position (erratum GS-7), so that a flat palm means a straight arm.
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ class PalmMapping:
     maximum_tilt : float
         Largest angle of the commanded direction from straight, on the axis [rad].
     tilt_loss : float
-        How much less tilt is allowed per distance of the tip from the axis [rad/m]; 0 is one limit everywhere. The
-        arm itself loses about one degree per millimetre.
+        How much less tilt is allowed per distance of the tip from the axis [rad/m]; 0 is one limit
+        everywhere. The arm itself loses about one degree per millimetre.
     """
 
     scale_x: float = 0.2
@@ -64,7 +64,9 @@ class PalmMapping:
         if not 0 < self.half_width < math.inf:
             raise ValueError(f"PalmMapping.half_width = {self.half_width}, must be > 0 and finite")
         if not 0 < self.lowest < self.highest < math.inf:
-            raise ValueError(f"PalmMapping: 0 < lowest < highest must hold, got {self.lowest}, {self.highest}")
+            raise ValueError(
+                f"PalmMapping: 0 < lowest < highest must hold, got {self.lowest}, {self.highest}"
+            )
         if not 0 < self.maximum_tilt < math.pi / 2:
             raise ValueError(f"PalmMapping.maximum_tilt = {self.maximum_tilt}, must be in (0, pi/2)")
         if not 0 <= self.tilt_loss < math.inf:

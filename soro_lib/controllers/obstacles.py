@@ -39,7 +39,7 @@ class Sphere:
 
 
 def clearances(
-    robot: Robot, actuation: ArrayLike, obstacles: Sequence[Sphere], points_per_piece: int = 10
+    robot: Robot, actuation: ArrayLike, obstacles: Sequence[Sphere], points_per_piece: int = 40
 ) -> list[Clearance]:
     """Return, for every obstacle and every soft piece of the arm, its nearest point, nearest first.
 

@@ -1,11 +1,11 @@
 """One step of the constrained inverse kinematics: the least squares of Lai et al., Eqs. (26), (27) and (29).
 
 Each objective is a sum of squares that is linear in the step of the actuation, so each step is a small convex
-quadratic program. It is stated twice: as the paper writes it, in cvxpy (:class:`ReadableStep`), and as the rows
-of one least-squares problem for the solver daqp (:func:`solve`). Both give the same step.
+quadratic program. It is stated twice: as the paper writes it, in cvxpy (:class:`ReadableStep`), and as the
+rows of one least-squares problem for the solver daqp (:func:`solve`). Both give the same step.
 
-Units inside this module are the paper's, because its damping lambda = 1 depends on them: millimetres for the slide
-and all positions, newtons for the cables. :class:`StepProblem` is built from SI quantities.
+Units inside this module are the paper's, because its damping lambda = 1 depends on them: millimetres for the
+slide and all positions, newtons for the cables. :class:`StepProblem` is built from SI quantities.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class StepWeights:
     damping : float
         lambda of Eqs. (26), (27), (29) on the cables [mm/N].
     slide_damping : float
-        The same on the slide [-]. The paper has none, which leaves the Hessian singular where the slide and the
-        cables can trade (erratum GS-18).
+        The same on the slide [-]. The paper has none, which leaves the Hessian singular where the slide and
+        the cables can trade (erratum GS-18).
     direction : float
         How many millimetres of position one radian of direction is worth [mm/rad]. The paper adds mm^2 and
         rad^2 without a weight, i.e. 1 (erratum GS-16); half the robot's length is a sensible one.
@@ -65,7 +65,9 @@ class StepWeights:
             if not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"StepWeights.{item.name} = {value}, must be finite and >= 0")
         if self.damping == 0 or self.slide_damping == 0:
-            raise ValueError("StepWeights.damping and slide_damping must be > 0: without them the step is not unique")
+            raise ValueError(
+                "StepWeights.damping and slide_damping must be > 0: without them the step is not unique"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +114,25 @@ class Step:
     actuation_step: Array
     converged: bool
     reason: str = ""
+
+
+def resolved_rate(jacobian: Array, velocity: ArrayLike, null_space_velocity: ArrayLike) -> Array:
+    """Return the actuation velocity (n,) by pseudo-inverse and null-space projection; Lai et al., Eq. (25).
+
+    Here for comparison: it knows no limits and no damping, which is why the paper turns to (26).
+
+    Parameters
+    ----------
+    jacobian : ndarray (3, n)
+        Tip Jacobian.
+    velocity : array_like (3,)
+        Wanted tip velocity [m/s].
+    null_space_velocity : array_like (n,)
+        Wanted actuation velocity, of which only the part that leaves the tip alone is used.
+    """
+    inverse = np.linalg.pinv(jacobian)
+    wanted = np.asarray(null_space_velocity, dtype=float)
+    return np.asarray(inverse @ np.asarray(velocity, dtype=float) + wanted - inverse @ (jacobian @ wanted))
 
 
 # --- the three objectives ----------------------------------------------------------------------------------
@@ -234,7 +255,9 @@ def solve(problem: StepProblem) -> Step:
         upper, lower = problem.upper, problem.lower
     if not (np.isfinite(gradient).all() and np.isfinite(hessian).all()):
         return Step(np.zeros(len(gradient)), False, "the problem is not finite")
-    step, _, flag, _ = daqp.solve(hessian, gradient, problem.matrix, upper, lower, np.zeros(len(upper), np.intc))
+    step, _, flag, _ = daqp.solve(
+        hessian, gradient, problem.matrix, upper, lower, np.zeros(len(upper), np.intc)
+    )
     if flag < 1:
         reason = "the bounds contradict each other" if flag == -1 else f"daqp stopped with flag {flag}"
         return Step(np.zeros(len(gradient)), False, reason)
@@ -242,7 +265,8 @@ def solve(problem: StepProblem) -> Step:
 
 
 class ReadableStep:
-    """The same least squares as the paper writes them, in cvxpy with parameters (DPP): the reference for :func:`solve`.
+    """The same least squares as the paper writes them, in cvxpy with parameters (DPP): the reference for
+    :func:`solve`.
 
     Parameters
     ----------
@@ -299,7 +323,9 @@ def _problem(blocks: Sequence[tuple[Array, Array, float]], lower: Array, upper: 
     right = np.concatenate([wanted * weight for _, wanted, weight in blocks])
     damping = np.full(len(lower), weights.damping)
     damping[0] = weights.slide_damping
-    return StepProblem(rows, right, damping, lower / scale, upper / scale, matrix, np.zeros(0) if bound is None else bound)
+    return StepProblem(
+        rows, right, damping, lower / scale, upper / scale, matrix, np.zeros(0) if bound is None else bound
+    )
 
 
 _SCALES: dict[int, Array] = {}

@@ -32,8 +32,8 @@ class PalmFilterSettings:
     position_sd : float
         Measurement noise of the palm position [m].
     velocity_sd : float
-        Measurement noise of the tracker's velocity [m/s]. It lags the palm by about 18 ms, so it is far noisier
-        than the position.
+        Measurement noise of the tracker's velocity [m/s]. It lags the palm by about 18 ms, so it is far
+        noisier than the position.
     initial_variance : float
         Diagonal of the initial covariance. The paper's 0.7 in mm^2, (mm/s)^2, ... is 0.7e-6 here.
     adaptive : bool
@@ -68,8 +68,8 @@ def transition_matrix(interval: float) -> Array:
 class PalmFilter:
     """Constant-acceleration Kalman filter of the palm position; Lai et al., Eqs. (6)-(12).
 
-    The state is (x, vx, ax, y, vy, ay, z, vz, az) in the device frame, SI units. The filter starts on the first
-    measurement and takes intervals from the device clock, so that holes in the stream do no harm.
+    The state is (x, vx, ax, y, vy, ay, z, vz, az) in the device frame, SI units. The filter starts on the
+    first measurement and takes intervals from the device clock, so that holes in the stream do no harm.
 
     Parameters
     ----------
@@ -167,7 +167,9 @@ class PalmFilter:
         for axis in (0, 3, 6):
             transition[axis, axis + 1] = transition[axis + 1, axis + 2] = interval
             transition[axis, axis + 2] = 0.5 * interval**2
-            process[axis + 2, axis + 2] = self.process_scale * self.settings.acceleration_density**2 * interval
+            process[axis + 2, axis + 2] = (
+                self.process_scale * self.settings.acceleration_density**2 * interval
+            )
         self._filter.predict()
 
     def _correct(self, measurement: Array, observation: Array, noise: Array) -> None:

@@ -1,7 +1,7 @@
 """Compiled kinematics of the cable-driven arm: positions, pointing direction and all Jacobians in one call.
 
-The same model as :class:`soro_lib.robots.CableDrivenArm` (tested equal to it), for loops that run at the rate of
-the sensor. Lai et al., Eqs. (1)-(3), (22)-(25).
+The same model as :class:`soro_lib.robots.CableDrivenArm` (tested equal to it), for loops that run at the rate
+of the sensor. Lai et al., Eqs. (1)-(3), (22)-(25).
 """
 
 from collections.abc import Callable
@@ -39,7 +39,8 @@ class Kinematics(NamedTuple):
 
 
 def compiled_kinematics(arm: CableDrivenArm) -> Callable[[Array], Kinematics]:
-    """Return the compiled kinematics of one arm: actuation (7,) to :class:`Kinematics`; limits are not checked.
+    """Return the compiled kinematics of one arm: actuation (7,) to :class:`Kinematics`; limits are not
+    checked.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """A simulated prototype of the cable-driven arm: the arm as it was built, mounted, pulled and measured.
 
-It differs from the model for stated physical reasons only, each drawn once per session from a declared range. No error
-is added to make a figure. Two actuations are offered: cables pulled with a commanded force, and cables wound to a
-commanded length.
+It differs from the model for stated physical reasons only, each drawn once per session from a declared range.
+No error is added to make a figure. Two actuations are offered: cables pulled with a commanded force, and
+cables wound to a commanded length.
 """
 
 from __future__ import annotations
@@ -68,7 +68,11 @@ class PrototypeRanges:
 
     def only(self, *names: str) -> PrototypeRanges:
         """Return the same ranges with every cause but the named ones switched off."""
-        off: dict[str, object] = {"bending_rigidity": (1.0, 1.0), "axial_rigidity": (1.0, 1.0), "friction": (0.0, 0.0)}
+        off: dict[str, object] = {
+            "bending_rigidity": (1.0, 1.0),
+            "axial_rigidity": (1.0, 1.0),
+            "friction": (0.0, 0.0),
+        }
         values = {item.name: off.get(item.name, 0.0) for item in fields(self)}
         return PrototypeRanges(**{**values, **{name: getattr(self, name) for name in names}})  # type: ignore[arg-type]
 
@@ -129,10 +133,14 @@ class Prototype:
             +1 when the cables were last pulled, -1 when they were last released: the sign of friction.
         """
         command = self.arm.check(actuation)
-        tension = self._tension_from_length(command) if by_length else self._tension_from_force(command, branch)
+        tension = (
+            self._tension_from_length(command) if by_length else self._tension_from_force(command, branch)
+        )
         return self._pieces(command[0], tension)
 
-    def points(self, actuation: ArrayLike, by_length: bool = False, branch: float = 1.0) -> tuple[Array, Array]:
+    def points(
+        self, actuation: ArrayLike, by_length: bool = False, branch: float = 1.0
+    ) -> tuple[Array, Array]:
         """Return where base, mid and tip truly are in the camera's frame {W}, and where the tip points.
 
         Returns
@@ -215,7 +223,10 @@ class Prototype:
 
 
 def drawn_prototype(
-    arm: CableDrivenArm, rng: np.random.Generator | None, sessions: int = 1, ranges: PrototypeRanges | None = None
+    arm: CableDrivenArm,
+    rng: np.random.Generator | None,
+    sessions: int = 1,
+    ranges: PrototypeRanges | None = None,
 ) -> Prototype:
     """Draw one prototype per session.
 
@@ -243,8 +254,14 @@ def drawn_prototype(
 
     lean = np.zeros((sessions, 3))
     offset = np.zeros((sessions, 3))
-    bending, axial = rng.uniform(*ranges.bending_rigidity, sessions), rng.uniform(*ranges.axial_rigidity, sessions)
-    radius, friction = arm.cable_radius + normal(ranges.cable_radius_sd, 6), rng.uniform(*ranges.friction, sessions)
+    bending, axial = (
+        rng.uniform(*ranges.bending_rigidity, sessions),
+        rng.uniform(*ranges.axial_rigidity, sessions),
+    )
+    radius, friction = (
+        arm.cable_radius + normal(ranges.cable_radius_sd, 6),
+        rng.uniform(*ranges.friction, sessions),
+    )
     tension_zero, length_zero = normal(ranges.tension_zero_sd, 6), normal(ranges.length_zero_sd, 6)
     offset[:, :2], lean[:, :2] = normal(ranges.base_offset_sd, 2), normal(ranges.base_lean_sd, 2)
     return Prototype(

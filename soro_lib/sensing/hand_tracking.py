@@ -140,7 +140,9 @@ def hand_samples(table: pd.DataFrame) -> Iterator[HandSample]:
             continue
         row = next((row for row in hands if identity[row] == current), hands[0])
         current = identity[row]
-        yield HandSample(time[row], current, palm[row], normal[row], fingers[row], velocity[row], confidence[row])
+        yield HandSample(
+            time[row], current, palm[row], normal[row], fingers[row], velocity[row], confidence[row]
+        )
 
 
 def timing_summary(table: pd.DataFrame) -> pd.Series:
@@ -224,7 +226,9 @@ def _read_playback(path: Path, maximum_rows: int) -> pd.DataFrame:
     if not isinstance(frames, list) or len(frames) < 2:
         raise RecordingError(f"{path.name}: not a LeapJS playback file (no list of frames)")
     if len(frames) > maximum_rows:
-        raise RecordingError(f"{path.name}: {len(frames):,} frames, at most {maximum_rows:,}; cut the recording")
+        raise RecordingError(
+            f"{path.name}: {len(frames):,} frames, at most {maximum_rows:,}; cut the recording"
+        )
     if isinstance(frames[0], list):
         frames = [_unpacked(frames[0], packed) for packed in frames[1:]]
     try:
@@ -255,9 +259,15 @@ def _playback_rows(frame: dict[str, Any]) -> list[dict[str, Any]]:
         return [stamp]
     rows = []
     for hand in frame["hands"]:
-        row = stamp | {"hand_id": hand["id"], "hand_type": hand.get("type"), "confidence": hand.get("confidence")}
+        row = stamp | {
+            "hand_id": hand["id"],
+            "hand_type": hand.get("type"),
+            "confidence": hand.get("confidence"),
+        }
         row |= dict(zip(PALM, hand["palmPosition"])) | dict(zip(NORMAL, hand["palmNormal"]))
-        row |= dict(zip(DIRECTION, hand.get("direction", ()))) | dict(zip(VELOCITY, hand.get("palmVelocity", ())))
+        row |= dict(zip(DIRECTION, hand.get("direction", ()))) | dict(
+            zip(VELOCITY, hand.get("palmVelocity", ()))
+        )
         row |= {"grab_strength": hand.get("grabStrength"), "pinch_strength": hand.get("pinchStrength")}
         fingers = [item for item in frame.get("pointables", ()) if item.get("handId") == hand["id"]]
         fingers = [item for item in fingers if not item.get("tool")]
@@ -297,7 +307,9 @@ def _checked(table: pd.DataFrame, name: str) -> pd.DataFrame:
     _require(np.isfinite(table["timestamp_us"]), table, "timestamp_us", name, "a finite time stamp")
     hand = table["hand_id"].notna()
     for column in HAND_COLUMNS:
-        _require(np.isfinite(table[column]) | ~hand, table, column, name, "a finite number where a hand is seen")
+        _require(
+            np.isfinite(table[column]) | ~hand, table, column, name, "a finite number where a hand is seen"
+        )
     for column in PALM:
         near = table[column].abs() <= MAXIMUM_COORDINATE
         _require(near | ~hand, table, column, name, f"at most {MAXIMUM_COORDINATE:g} mm from the device")
@@ -307,7 +319,9 @@ def _checked(table: pd.DataFrame, name: str) -> pd.DataFrame:
     length = np.linalg.norm(table[list(NORMAL)].to_numpy(), axis=1)
     unit = (length > NORMAL_LENGTH[0]) & (length < NORMAL_LENGTH[1])
     bound = f"a palm normal of length {NORMAL_LENGTH[0]} to {NORMAL_LENGTH[1]}"
-    _require(pd.Series(unit, table.index) | ~hand, table.assign(palm_normal=length), "palm_normal", name, bound)
+    _require(
+        pd.Series(unit, table.index) | ~hand, table.assign(palm_normal=length), "palm_normal", name, bound
+    )
     table[list(NORMAL)] = table[list(NORMAL)].to_numpy() / np.where(unit, length, 1.0)[:, None]
 
     _require_order(table, name)
@@ -320,7 +334,9 @@ def _numeric(column: pd.Series, name: str) -> pd.Series:
     wrong = number.isna() & column.notna()
     if wrong.any():
         row = int(np.argmax(wrong.to_numpy()))
-        raise RecordingError(f"{name}: row {row + 1}, {column.name} = {column.iloc[row]!r}, expected a number")
+        raise RecordingError(
+            f"{name}: row {row + 1}, {column.name} = {column.iloc[row]!r}, expected a number"
+        )
     return number
 
 
@@ -344,10 +360,14 @@ def _require_order(table: pd.DataFrame, name: str) -> None:
     repeated = table.duplicated(["timestamp_us", "hand_id"]).to_numpy()
     if repeated.any():
         row = int(np.argmax(repeated))
-        raise RecordingError(f"{name}: row {row + 1}, timestamp_us = {stamp[row]:.0f} is repeated for the same hand")
+        raise RecordingError(
+            f"{name}: row {row + 1}, timestamp_us = {stamp[row]:.0f} is repeated for the same hand"
+        )
 
 
-def _triples(table: pd.DataFrame, columns: tuple[str, ...], scale: float = 1.0) -> list[tuple[float, float, float]]:
+def _triples(
+    table: pd.DataFrame, columns: tuple[str, ...], scale: float = 1.0
+) -> list[tuple[float, float, float]]:
     """Return three columns as a list of triples; NaN where the table lacks them."""
     if columns[0] not in table:
         return [(np.nan, np.nan, np.nan)] * len(table)

@@ -142,7 +142,11 @@ def synthetic_recording(
     time = tracker_clock(rng, duration, noise)
     flags, change = _finger_flags(rng, time, gestures, noise)
 
-    palm = position(time) + _unsteadiness(rng, time, noise) + change[:, None] * _direction(rng) * noise.transit_shift
+    palm = (
+        position(time)
+        + _unsteadiness(rng, time, noise)
+        + change[:, None] * _direction(rng) * noise.transit_shift
+    )
     wobble = np.column_stack([coloured_noise(rng, time, noise.normal) for _ in range(3)])
     turn = change[:, None] * _direction(rng) * noise.transit_turn
     hand = Rotation.from_rotvec(wobble + turn) * Rotation.from_rotvec(tilt(time))
@@ -170,7 +174,9 @@ def tracker_clock(rng: np.random.Generator, duration: float, noise: HandNoise) -
     return time[time <= duration]
 
 
-def coloured_noise(rng: np.random.Generator, time: Array, detrended_sd: float, exponent: float = 3.75) -> Array:
+def coloured_noise(
+    rng: np.random.Generator, time: Array, detrended_sd: float, exponent: float = 3.75
+) -> Array:
     """Return tremor whose power falls as frequency to the minus ``exponent`` between 0.5 and 22 Hz.
 
     Parameters
@@ -263,7 +269,9 @@ def _direction(rng: np.random.Generator) -> Array:
     return vector / np.linalg.norm(vector)
 
 
-def _shaped(rng: np.random.Generator, count: int, rate: float, low: float, high: float, exponent: float) -> Array:
+def _shaped(
+    rng: np.random.Generator, count: int, rate: float, low: float, high: float, exponent: float
+) -> Array:
     """Return Gaussian noise (count,) with a power-law spectrum between two frequencies [Hz]."""
     frequency = np.fft.rfftfreq(count, 1 / rate)
     inside = (frequency >= low) & (frequency <= high)
@@ -337,7 +345,11 @@ def _with_losses(rng: np.random.Generator, table: pd.DataFrame, noise: HandNoise
         lost, after = (time >= instant) & (time < instant + lasting), time >= instant + lasting
         table.loc[after, "hand_id"] = int(table["hand_id"].max()) + 1
         table.loc[after, "hand_type"] = "left" if rng.random() < 0.2 else "right"
-        jump = _direction(rng) * (10.0 if lasting < 0.1 else 60.0) * np.exp(-(time[after] - instant) / 1.0)[:, None]
+        jump = (
+            _direction(rng)
+            * (10.0 if lasting < 0.1 else 60.0)
+            * np.exp(-(time[after] - instant) / 1.0)[:, None]
+        )
         table.loc[after, list(PALM)] += jump
         unseen |= lost
     table.loc[unseen, hand] = pd.NA

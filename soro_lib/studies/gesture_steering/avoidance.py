@@ -37,7 +37,6 @@ POLICIES: dict[str, tuple[float, float | None]] = {
     "off": (0.0, None),
     "eta = 10": (10.0, None),
     "eta = 100": (100.0, None),
-    "eta = 1000": (1000.0, None),
     "hard, 1 mm": (0.0, 1e-3),
 }
 """Weight eta of Eq. (29) [mm^2] and guaranteed clearance [m] of the ways to avoid that are compared."""
@@ -60,8 +59,9 @@ def crossed(rng: np.random.Generator, line: str, policy: str, duration: float = 
     Returns
     -------
     DataFrame
-        As :func:`soro_lib.studies.gesture_steering.steering.result_table`, with ``deviation_{x,y,z}_mm`` (tip minus
-        target) and ``clearance_mm`` (surface to surface, negative in collision), ``line`` and ``policy``.
+        As :func:`soro_lib.studies.gesture_steering.steering.result_table`, with ``deviation_{x,y,z}_mm`` (tip
+        minus target) and ``clearance_mm`` (surface to surface, negative in collision), ``line`` and
+        ``policy``.
     """
     start, end = np.array(LINES[line])
 
@@ -71,7 +71,11 @@ def crossed(rng: np.random.Generator, line: str, policy: str, duration: float = 
 
     eta, margin = POLICIES[policy]
     settings = SteeringSettings(
-        mapping=HIGH_REACH, weights=StepWeights(avoidance=eta), iterations=2, obstacles=(OBSTACLE,), margin=margin
+        mapping=HIGH_REACH,
+        weights=StepWeights(avoidance=eta),
+        iterations=2,
+        obstacles=(OBSTACLE,),
+        margin=margin,
     )
     arm = CableDrivenArm()
     table = commanding_hand(rng, duration, path, straight, mapping=settings.mapping)
@@ -94,7 +98,8 @@ def avoidance_table(seed: int, seeds: int = 3) -> tuple[pd.DataFrame, pd.DataFra
     runs : DataFrame
         All rows of :func:`crossed`, with ``seed``.
     summary : DataFrame
-        Per line, policy and seed: ``x_mm``, ``y_mm``, ``z_mm`` (largest deviation), ``clearance_mm`` (smallest).
+        Per line, policy and seed: ``x_mm``, ``y_mm``, ``z_mm`` (largest deviation), ``clearance_mm``
+        (smallest).
     """
     runs = []
     for index, child in enumerate(np.random.SeedSequence(seed).spawn(seeds)):
@@ -102,7 +107,9 @@ def avoidance_table(seed: int, seeds: int = 3) -> tuple[pd.DataFrame, pd.DataFra
             for policy in POLICIES:
                 runs.append(crossed(np.random.default_rng(child), line, policy).assign(seed=index))
     table = pd.concat(runs, ignore_index=True)
-    deviations = table[[f"deviation_{axis}_mm" for axis in "xyz"]].abs().set_axis(["x_mm", "y_mm", "z_mm"], axis=1)
+    deviations = (
+        table[[f"deviation_{axis}_mm" for axis in "xyz"]].abs().set_axis(["x_mm", "y_mm", "z_mm"], axis=1)
+    )
     keys = [table["line"], table["policy"], table["seed"]]
     summary = deviations.groupby(keys, sort=False).max()
     summary["clearance_mm"] = table.groupby(keys, sort=False)["clearance_mm"].min()

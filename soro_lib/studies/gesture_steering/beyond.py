@@ -19,8 +19,11 @@ from soro_lib.studies.gesture_steering.steering import ServoBus, commanding_hand
 Array = NDArray[np.float64]
 
 
-def reached(arm: CableDrivenArm, positions: Array, directions: Array, iterations: int = 40) -> tuple[Array, Array]:
-    """Return how close the arm comes to poses: distances (n,) [m] and angles (n,) [rad], by repeated Eq. (26).
+def reached(
+    arm: CableDrivenArm, positions: Array, directions: Array, iterations: int = 40
+) -> tuple[Array, Array]:
+    """Return how close the arm comes to poses: distances (n,) [m] and angles (n,) [rad], by repeated Eq.
+    (26).
 
     Local solves from two starts: "not reached" means "not found".
 
@@ -84,7 +87,11 @@ def reach_map(
             for tilt in tilts:
                 around = 2 * np.pi * np.arange(azimuths if tilt > 0 else 1) / azimuths
                 directions = np.column_stack(
-                    [np.sin(tilt) * np.cos(around), np.sin(tilt) * np.sin(around), np.full_like(around, np.cos(tilt))]
+                    [
+                        np.sin(tilt) * np.cos(around),
+                        np.sin(tilt) * np.sin(around),
+                        np.full_like(around, np.cos(tilt)),
+                    ]
                 )
                 positions = np.tile([radius, 0.0, height], (len(around), 1))
                 distance, angle = reached(arm, positions, directions)
@@ -111,8 +118,9 @@ def mapping_choice(reach: pd.DataFrame, scales: tuple[float, ...] = (-0.05, -0.1
     Returns
     -------
     DataFrame
-        ``scale_z``, ``offset_mm``, ``z_low_mm``, ``z_high_mm``, ``straight`` (share of the box with a reachable straight
-        tip), ``tilt_20`` (share where every tilt up to 20 deg is), ``clamp_deg`` (tilt reachable in 90 % of the box).
+        ``scale_z``, ``offset_mm``, ``z_low_mm``, ``z_high_mm``, ``straight`` (share of the box with a
+        reachable straight tip), ``tilt_20`` (share where every tilt up to 20 deg is), ``clamp_deg`` (tilt
+        reachable in 90 % of the box).
     """
     grid = reach.pivot(index="z_mm", columns="radius_mm", values="tilt_deg").fillna(-10.0)
     side = np.linspace(-0.15, 0.15, 13)
@@ -126,7 +134,9 @@ def mapping_choice(reach: pd.DataFrame, scales: tuple[float, ...] = (-0.05, -0.1
             tilt = _interpolated(grid, tips[:, 2], np.hypot(tips[:, 0], tips[:, 1]))
             low, high = tips[:, 2].min(), tips[:, 2].max()
             clamp = max(float(np.percentile(tilt, 10)), 0.0)
-            rows.append((scale, offset * 1e3, low, high, np.mean(tilt >= 0), np.mean(tilt >= 20 - 1e-9), clamp))
+            rows.append(
+                (scale, offset * 1e3, low, high, np.mean(tilt >= 0), np.mean(tilt >= 20 - 1e-9), clamp)
+            )
     columns = ["scale_z", "offset_mm", "z_low_mm", "z_high_mm", "straight", "tilt_20", "clamp_deg"]
     return pd.DataFrame(rows, columns=columns)
 
@@ -141,8 +151,8 @@ def clamp_study(table: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``limit``, mean, 95 % and largest ``position_*_mm`` and ``direction_*_deg`` between tip and target outside the
-        fist, and ``asked_deg``: mean tilt that is asked for.
+        ``limit``, mean, 95 % and largest ``position_*_mm`` and ``direction_*_deg`` between tip and target
+        outside the fist, and ``asked_deg``: mean tilt that is asked for.
     """
     rows = []
     for name, mapping in (
@@ -172,14 +182,16 @@ def _interpolated(grid: pd.DataFrame, z: Array, radius: Array) -> Array:
     return np.asarray(interpolate(points))
 
 
-def fist_direction(rng_seed: np.random.SeedSequence, weights: tuple[float, ...] = (0.0, 1.0, 5.0, 20.0)) -> pd.DataFrame:
+def fist_direction(
+    rng_seed: np.random.SeedSequence, weights: tuple[float, ...] = (0.0, 1.0, 5.0, 20.0)
+) -> pd.DataFrame:
     """Give Eq. (27) a direction term of several weights [mm/rad], in the experiment of Fig. 8(a).
 
     Returns
     -------
     DataFrame
-        ``weight``, and over the fist: mean ``direction_error_deg``, mean ``position_error_mm``, ``mid_drift_mm``
-        (largest); ``exit_step_deg``: largest turn per 30 ms after the fist.
+        ``weight``, and over the fist: mean ``direction_error_deg``, mean ``position_error_mm``,
+        ``mid_drift_mm`` (largest); ``exit_step_deg``: largest turn per 30 ms after the fist.
     """
     rows = []
     for weight in weights:
@@ -199,13 +211,14 @@ def delay_against_rate(rng_seed: np.random.SeedSequence, rates: tuple[float, ...
                        bus: ServoBus | None = None) -> pd.DataFrame:  # fmt: skip
     """Measure the delay from the hand to the commanded tip for several loop rates.
 
-    The hand follows the infinity path while its tilt sways; the delay is the shift that fits the commanded tip, held
-    between updates, best to what the hand did.
+    The hand follows the infinity path while its tilt sways; the delay is the shift that fits the commanded
+    tip, held between updates, best to what the hand did.
 
     Returns
     -------
     DataFrame
-        ``loop``, ``position_ms``, ``direction_ms``; the last row, "servo bus", waits for the bus in each loop.
+        ``loop``, ``position_ms``, ``direction_ms``; the last row, "servo bus", waits for the bus in each
+        loop.
     """
     bus = bus or ServoBus()
 

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 RECORDING_SEED = 20260
 A4_WIDTH, A4_LENGTH = 0.210, 0.297
+HOVER = 8.0
+"""Time that a hand hovers [s]."""
 FILTERS = {
     "fixed noise": PalmFilterSettings(),
     "adaptive noise": PalmFilterSettings(adaptive=True),
@@ -41,7 +43,10 @@ COLUMNS = {
     "hand_id": "[-] identity given by the tracker; empty when no hand is seen",
     "hand_type": "[-] left or right",
     "confidence": "[-] confidence of the tracker, 0 to 1",
-    **{f"palm_{axis}_mm": f"[mm] palm centre, device {axis} (x right, y up, z toward the user)" for axis in "xyz"},
+    **{
+        f"palm_{axis}_mm": f"[mm] palm centre, device {axis} (x right, y up, z toward the user)"
+        for axis in "xyz"
+    },
     **{f"palm_n{axis}": f"[-] palm normal, a unit vector, device {axis}" for axis in "xyz"},
     **{f"dir_{axis}": f"[-] direction of the hand, a unit vector, device {axis}" for axis in "xyz"},
     **{finger: "[-] 1 = extended, 0 = curled" for finger in FINGERS},
@@ -92,7 +97,9 @@ def write_recordings(directory: Path, seed: int = RECORDING_SEED) -> None:
         write_card(path, description=description, columns=COLUMNS, generator=generator, seed=seed)
 
 
-def steering_recording(rng: np.random.Generator, duration: float, noise: HandNoise | None = None) -> pd.DataFrame:
+def steering_recording(
+    rng: np.random.Generator, duration: float, noise: HandNoise | None = None
+) -> pd.DataFrame:
     """Simulate a person who steers at random through all gestures, inside the allowed box.
 
     Parameters
@@ -124,7 +131,7 @@ def tracing_recording(rng: np.random.Generator, noise: HandNoise) -> pd.DataFram
     return synthetic_recording(rng, duration, path, lambda time: np.zeros((len(time), 3)), noise=noise)
 
 
-def hover_recording(rng: np.random.Generator, duration: float = 16.0) -> pd.DataFrame:
+def hover_recording(rng: np.random.Generator, duration: float = 2 * HOVER) -> pd.DataFrame:
     """Simulate a palm that hovers for half the time, then a V-sign that hovers for the rest; Lai et al., Fig. 10."""
 
     def position(time: Array) -> Array:
@@ -149,9 +156,9 @@ def timeline(table: pd.DataFrame, mapping: PalmMapping | None = None) -> pd.Data
     Returns
     -------
     DataFrame
-        One row per frame with a hand: ``time_s``; ``raw_{x,y,z}_mm`` and ``filtered_{x,y,z}_mm`` of the palm (device
-        frame); ``goal_{x,y,z}_mm`` and ``goal_d{x,y,z}`` of the tip; ``tilt_raw_deg``, ``tilt_deg`` of the pointing
-        direction before and after its filter; ``fingers`` as "11111"; ``mode``.
+        One row per frame with a hand: ``time_s``; ``raw_{x,y,z}_mm`` and ``filtered_{x,y,z}_mm`` of the palm
+        (device frame); ``goal_{x,y,z}_mm`` and ``goal_d{x,y,z}`` of the tip; ``tilt_raw_deg``, ``tilt_deg``
+        of the pointing direction before and after its filter; ``fingers`` as "11111"; ``mode``.
     """
     mapping = mapping or PalmMapping()
     palm_filter, direction_filter, rule = PalmFilter(), DirectionFilter(), GestureRule()
@@ -173,11 +180,23 @@ def timeline(table: pd.DataFrame, mapping: PalmMapping | None = None) -> pd.Data
              "".join("1" if flag else "0" for flag in sample.fingers), mode.value)
         )  # fmt: skip
     axes = [f"{kind}_{axis}_mm" for kind in ("raw", "filtered", "goal") for axis in "xyz"]
-    columns = ["time_s", *axes, "goal_dx", "goal_dy", "goal_dz", "tilt_raw_deg", "tilt_deg", "fingers", "mode"]
+    columns = [
+        "time_s",
+        *axes,
+        "goal_dx",
+        "goal_dy",
+        "goal_dz",
+        "tilt_raw_deg",
+        "tilt_deg",
+        "fingers",
+        "mode",
+    ]
     return pd.DataFrame(rows, columns=columns)
 
 
-def filtered_palm(table: pd.DataFrame, settings: PalmFilterSettings, use_velocity: bool = True) -> tuple[Array, Array, Array]:
+def filtered_palm(
+    table: pd.DataFrame, settings: PalmFilterSettings, use_velocity: bool = True
+) -> tuple[Array, Array, Array]:
     """Return time (n,) [s], raw and filtered palm positions (n, 3) [m] of the frames with a hand."""
     samples = [sample for sample in hand_samples(table) if sample.hand_id is not None]
     palm_filter = PalmFilter(settings)
@@ -197,8 +216,8 @@ def filter_comparison(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``recording``, ``filter``, ``error_mm`` (mean distance to the smoother), ``lag_ms`` (delay that fits it
-        best), ``roughness`` (second difference relative to the raw palm's).
+        ``recording``, ``filter``, ``error_mm`` (mean distance to the smoother), ``lag_ms`` (delay that fits
+        it best), ``roughness`` (second difference relative to the raw palm's).
     """
     rows = []
     for recording, table in tables.items():
@@ -217,8 +236,8 @@ def sheet_deviation(table: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``time_s``, ``x_mm``, ``z_mm`` (filtered, device frame), ``deviation_mm`` (distance to the nearest edge, in the
-        plane of the sheet), ``tilt_deg`` of the palm normal from straight down.
+        ``time_s``, ``x_mm``, ``z_mm`` (filtered, device frame), ``deviation_mm`` (distance to the nearest
+        edge, in the plane of the sheet), ``tilt_deg`` of the palm normal from straight down.
     """
     time, _, filtered = filtered_palm(table, FILTERS["fixed noise"])
     x, z = np.abs(filtered[:, 0]) - A4_LENGTH / 2, np.abs(filtered[:, 2]) - A4_WIDTH / 2
@@ -236,7 +255,9 @@ def sheet_deviation(table: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def _against_smoother(time: Array, raw: Array, filtered: Array, cutoff: float = 6.0) -> tuple[float, float, float]:
+def _against_smoother(
+    time: Array, raw: Array, filtered: Array, cutoff: float = 6.0
+) -> tuple[float, float, float]:
     """Return mean error [mm], lag [ms] and relative roughness of a filtered path."""
     rate = 115.0
     grid = np.arange(time[0], time[-1], 1 / rate)
@@ -265,7 +286,9 @@ def _tilting(pitch_and_roll):  # type: ignore[no-untyped-def]
 
     def tilt(time: Array) -> Array:
         pitch, roll = pitch_and_roll(time).T
-        turns = Rotation.from_rotvec(np.outer(pitch, [1, 0, 0])) * Rotation.from_rotvec(np.outer(roll, [0, 0, 1]))
+        turns = Rotation.from_rotvec(np.outer(pitch, [1, 0, 0])) * Rotation.from_rotvec(
+            np.outer(roll, [0, 0, 1])
+        )
         return turns.as_rotvec()
 
     return tilt

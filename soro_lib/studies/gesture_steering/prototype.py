@@ -14,7 +14,7 @@ from soro_lib.robots import CableDrivenArm
 from soro_lib.robots.cable_driven_kernels import compiled_kinematics
 from soro_lib.robots.cable_driven_plant import Prototype, PrototypeRanges, drawn_prototype, pointing_angle
 from soro_lib.sensing.synthetic_hand import HandNoise
-from soro_lib.studies.gesture_steering.hands import hover_recording
+from soro_lib.studies.gesture_steering.hands import HOVER, hover_recording
 from soro_lib.studies.gesture_steering.steering import CONTROL_PERIOD, commanding_hand, result_table, steered
 
 Array = NDArray[np.float64]
@@ -58,8 +58,8 @@ def table2_sessions(
     by_length : bool
         Wind cables to lengths instead of pulling with forces.
     registered_at_tip : bool
-        Lay the camera frame so that the straight tip of configuration 0 reads (0, 0) in X and Y, as the printed
-        readings suggest.
+        Lay the camera frame so that the straight tip of configuration 0 reads (0, 0) in X and Y, as the
+        printed readings suggest.
 
     Returns
     -------
@@ -81,7 +81,9 @@ def table2_sessions(
     index = pd.MultiIndex.from_product(
         [range(sessions), range(4), POINTS], names=["session", "configuration", "point"]
     )
-    table = pd.DataFrame(errors.reshape(-1, 3) * 1e3, index=index, columns=[f"error_{axis}_mm" for axis in "xyz"])
+    table = pd.DataFrame(
+        errors.reshape(-1, 3) * 1e3, index=index, columns=[f"error_{axis}_mm" for axis in "xyz"]
+    )
     table["norm_mm"] = np.linalg.norm(table.to_numpy(), axis=1)
     return table.reset_index()
 
@@ -98,8 +100,8 @@ def printed_percentiles(sessions: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``configuration``, ``point``, ``printed_mm``, ``median_mm``, ``low_mm``, ``high_mm`` (95 % of sessions),
-        ``percentile`` of the printed norm.
+        ``configuration``, ``point``, ``printed_mm``, ``median_mm``, ``low_mm``, ``high_mm`` (95 % of
+        sessions), ``percentile`` of the printed norm.
     """
     printed = experiment_error(printed_positions("sim"), printed_positions("exp")) * 1e3
     rows = []
@@ -117,8 +119,8 @@ def cause_study(seed: np.random.SeedSequence, sessions: int = 400) -> pd.DataFra
     Returns
     -------
     DataFrame
-        ``control``, ``cause``, ``claim`` (probability that every axis is within 2 mm), ``x_mm``, ``y_mm``, ``z_mm``
-        (median over sessions of the largest error).
+        ``control``, ``cause``, ``claim`` (probability that every axis is within 2 mm), ``x_mm``, ``y_mm``,
+        ``z_mm`` (median over sessions of the largest error).
     """
     rows = []
     for control in ("force", "length"):
@@ -126,12 +128,16 @@ def cause_study(seed: np.random.SeedSequence, sessions: int = 400) -> pd.DataFra
             ranges = PrototypeRanges() if names is None else PrototypeRanges().only(*names)
             rng = np.random.default_rng(seed)
             table = table2_sessions(rng, sessions, ranges, by_length=control == "length")
-            largest = table[[f"error_{axis}_mm" for axis in "xyz"]].abs().groupby(table["session"]).max().median()
+            largest = (
+                table[[f"error_{axis}_mm" for axis in "xyz"]].abs().groupby(table["session"]).max().median()
+            )
             rows.append((control, cause, within_claim(table).mean(), *largest))
     return pd.DataFrame(rows, columns=["control", "cause", "claim", "x_mm", "y_mm", "z_mm"])
 
 
-def followed(prototype: Prototype, commands: pd.DataFrame, rng: np.random.Generator, by_length: bool = False) -> pd.DataFrame:
+def followed(
+    prototype: Prototype, commands: pd.DataFrame, rng: np.random.Generator, by_length: bool = False
+) -> pd.DataFrame:
     """Let prototypes follow the commands of a steering session and measure them; Lai et al., Eq. (28).
 
     Parameters
@@ -151,7 +157,10 @@ def followed(prototype: Prototype, commands: pd.DataFrame, rng: np.random.Genera
         Per session and time: ``session``, ``time_s``, ``sim_*_mm``, ``mea_*_mm``, ``position_error_mm``,
         ``direction_error_deg``.
     """
-    actuations = commands[["slide_mm", *(f"cable_{index}" for index in range(1, 7))]].to_numpy() * [1e-3, *[1.0] * 6]
+    actuations = commands[["slide_mm", *(f"cable_{index}" for index in range(1, 7))]].to_numpy() * [
+        1e-3,
+        *[1.0] * 6,
+    ]
     kinematics = compiled_kinematics(prototype.arm)
     branch = _branches(actuations)
     frames = []
@@ -185,8 +194,8 @@ def fig10_commands(seed: int = 1) -> dict[str, pd.DataFrame]:
     settings = SteeringSettings()
     hover = result_table(steered(hover_recording(streams[0]), settings, interval=CONTROL_PERIOD))
     hover["time_s"] -= hover["time_s"].iloc[0]
-    panels = {"a": hover.query("time_s < 8").copy(), "b": hover.query("time_s >= 8").copy()}
-    panels["b"]["time_s"] -= 8.0
+    panels = {"a": hover.query("time_s < @HOVER").copy(), "b": hover.query("time_s >= @HOVER").copy()}
+    panels["b"]["time_s"] -= HOVER
     for panel, path, direction, stream in (
         ("c", _slanted_circle, _leaning_in, streams[1]),
         ("d", _rising_arc, _swaying, streams[2]),
@@ -196,7 +205,9 @@ def fig10_commands(seed: int = 1) -> dict[str, pd.DataFrame]:
     return panels
 
 
-def fig10(commands: dict[str, pd.DataFrame], rng: np.random.Generator, sessions: int = 20, every: int = 3) -> pd.DataFrame:
+def fig10(
+    commands: dict[str, pd.DataFrame], rng: np.random.Generator, sessions: int = 20, every: int = 3
+) -> pd.DataFrame:
     """Let prototypes follow the sessions of Fig. 10; every so many frames are measured.
 
     Returns
@@ -214,10 +225,14 @@ def fig10(commands: dict[str, pd.DataFrame], rng: np.random.Generator, sessions:
 def steady_state(measured: pd.DataFrame, settle: float = 2.0) -> pd.DataFrame:
     """Return the mean errors per panel and session after the first ``settle`` seconds."""
     late = measured[measured["time_s"] >= settle]
-    return late.groupby(["panel", "session"])[["position_error_mm", "direction_error_deg"]].mean().reset_index()
+    return (
+        late.groupby(["panel", "session"])[["position_error_mm", "direction_error_deg"]].mean().reset_index()
+    )
 
 
-def tip_scatter(actuations: Sequence[Array], rng: np.random.Generator, sessions: int = 300) -> list[tuple[Array, Array]]:
+def tip_scatter(
+    actuations: Sequence[Array], rng: np.random.Generator, sessions: int = 300
+) -> list[tuple[Array, Array]]:
     """Return mean (3,) [m] and covariance (3, 3) [m^2] of the true tip over prototypes, per actuation (7,)."""
     prototype = drawn_prototype(CableDrivenArm(), rng, sessions)
     found = []

@@ -37,7 +37,7 @@ def _within(change: Callable[[HandSample], HandSample], lasting: float) -> Fault
 
 
 def _lost(lasting: float, jump: float) -> Fault:
-    """Lose the hand; it returns under a new identity, displaced by ``jump`` [m] that decays over a second."""
+    """Lose the hand; it returns under a new identity, displaced by ``jump`` [m] that decays in a tenth of a second."""
 
     def fault(samples: Samples, _: float) -> Samples:
         hit, found, identity, since = bursts(samples, lasting), [], 100, -np.inf
@@ -50,7 +50,7 @@ def _lost(lasting: float, jump: float) -> Fault:
                 found.append(sample)
             else:
                 x, y, z = sample.palm
-                shift = jump * float(np.exp(-(sample.time - since)))
+                shift = jump * float(np.exp(-(sample.time - since) / 0.1))
                 found.append(replace(sample, hand_id=identity, palm=(x + shift, y, z)))
         return found
 
@@ -63,7 +63,9 @@ def _repeated(samples: Samples, _: float) -> Samples:
 
 def _backward(samples: Samples, _: float) -> Samples:
     hit = bursts(samples, 0.3)
-    return [replace(sample, time=sample.time - 1.0) if struck else sample for sample, struck in zip(samples, hit)]
+    return [
+        replace(sample, time=sample.time - 1.0) if struck else sample for sample, struck in zip(samples, hit)
+    ]
 
 
 def _moved(sample: HandSample, shift: tuple[float, float, float]) -> HandSample:
@@ -103,7 +105,9 @@ def sound_hand(rng: np.random.Generator, duration: float = 24.0) -> Samples:
     return list(hand_samples(synthetic_recording(rng, duration, position, turn)))
 
 
-def run_with_fault(samples: Sequence[HandSample], name: str, settings: SteeringSettings | None = None) -> list[SteeringResult]:
+def run_with_fault(
+    samples: Sequence[HandSample], name: str, settings: SteeringSettings | None = None
+) -> list[SteeringResult]:
     """Replay samples with a fault of ``FAULTS`` put in."""
     return replay(GestureSteering(CableDrivenArm(), settings), FAULTS[name](list(samples), 0.0))
 
@@ -115,15 +119,24 @@ def robustness_table(samples: Sequence[HandSample], settings: SteeringSettings |
     -------
     DataFrame
         ``fault``, ``unsound_frames``, ``tip_speed_mm_s`` (largest), ``mode_changes`` beyond the sound run's,
-        ``deviation_mm`` (largest distance to the sound run's tip), ``recovery_ms`` (longest time after a fault until
-        the tip is within 1 mm of the sound run's for good, before the next), ``finite`` (all commands).
+        ``deviation_mm`` (largest distance to the sound run's tip), ``recovery_ms`` (longest time after a
+        fault until the tip is within 1 mm of the sound run's for good, before the next), ``finite`` (all
+        commands).
     """
     sound = run_with_fault(samples, "none", settings)
     rows = []
     for name in FAULTS:
         results = run_with_fault(samples, name, settings)
         rows.append((name, *_compared(results, sound)))
-    columns = ["fault", "unsound_frames", "tip_speed_mm_s", "mode_changes", "deviation_mm", "recovery_ms", "finite"]
+    columns = [
+        "fault",
+        "unsound_frames",
+        "tip_speed_mm_s",
+        "mode_changes",
+        "deviation_mm",
+        "recovery_ms",
+        "finite",
+    ]
     return pd.DataFrame(rows, columns=columns)
 
 

@@ -25,7 +25,8 @@ LEAD = 2.0
 CONTROL_PERIOD = 0.030
 """The paper's sampling time [s]."""
 HIGH_REACH = PalmMapping(offset=0.165)
-"""The device 75 mm lower, all scales as printed. With the printed offset the 140 mm of Fig. 7(b) need a palm 50 mm above
+"""The device 75 mm lower, all scales as printed. With the printed offset the 140 mm of Fig. 7(b) need a palm
+50 mm above
 the device, which is outside the allowed box (erratum GS-6)."""
 
 
@@ -122,9 +123,10 @@ def result_table(results: Sequence[SteeringResult]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``time_s`` from the end of the lead; ``tip_*_mm``, ``target_*_mm``, ``goal_*_mm``; ``alpha_deg``, ``gamma_deg``:
-        tilt of the tip towards +x and +y, and of the target (``target_alpha_deg``, ...); ``position_error_mm``,
-        ``direction_error_deg``; ``mode``, ``reason``; ``slide_mm`` and ``cable_1`` to ``cable_6`` (-N).
+        ``time_s`` from the end of the lead; ``tip_*_mm``, ``target_*_mm``, ``goal_*_mm``; ``alpha_deg``,
+        ``gamma_deg``: tilt of the tip towards +x and +y, and of the target (``target_alpha_deg``, ...);
+        ``position_error_mm``, ``direction_error_deg``; ``mode``, ``reason``; ``slide_mm`` and ``cable_1`` to
+        ``cable_6`` (-N).
     """
     time = np.array([result.time for result in results])
     columns: dict[str, ArrayLike] = {"time_s": time - time[0] - LEAD}
@@ -141,7 +143,10 @@ def result_table(results: Sequence[SteeringResult]) -> pd.DataFrame:
         ("goal_", [result.goal.direction for result in results]),
     ):
         x, y, z = np.array(rows).T
-        columns |= {f"{name}alpha_deg": np.degrees(np.arctan2(x, z)), f"{name}gamma_deg": np.degrees(np.arctan2(y, z))}
+        columns |= {
+            f"{name}alpha_deg": np.degrees(np.arctan2(x, z)),
+            f"{name}gamma_deg": np.degrees(np.arctan2(y, z)),
+        }
     columns["position_error_mm"] = [1e3 * result.position_error for result in results]
     columns["direction_error_deg"] = [np.degrees(result.direction_error) for result in results]
     columns["mode"] = [result.mode.value for result in results]
@@ -264,7 +269,8 @@ def direction_steps(table: pd.DataFrame, per: float = CONTROL_PERIOD) -> Array:
 def fig9(rng: np.random.Generator, duration: float = 130.0, bus: ServoBus | None = None) -> pd.DataFrame:
     """Steer at random and note the rate of the loop, without and with the servo bus.
 
-    The rate is simulated, not timed: a loop takes the newest frame, computes, and, with servos, waits for the bus.
+    The rate is simulated, not timed: a loop takes the newest frame, computes, and, with servos, waits for the
+    bus.
 
     Returns
     -------

@@ -40,8 +40,9 @@ def table2_errors() -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``configuration``, ``point``, ``error_{x,y,z}_mm`` (sim. minus exp.), ``norm_mm``, and the same relative to the
-        robot's own base, ``relative_{x,y,z}_mm``, which takes the registration of the frame out.
+        ``configuration``, ``point``, ``error_{x,y,z}_mm`` (sim. minus exp.), ``norm_mm``, and the same
+        relative to the robot's own base, ``relative_{x,y,z}_mm``, which takes the registration of the frame
+        out.
     """
     error = (printed_positions("sim") - printed_positions("exp")) * 1e3
     relative = error - error[:, :1]
@@ -58,8 +59,9 @@ def table2_errors() -> pd.DataFrame:
 def segment_chords() -> pd.DataFrame:
     """Measure the straight distances between the printed points of Table II.
 
-    A chord cannot be longer than its arc, and a compressed segment not longer than 50 mm, so a simulated chord above
-    50 mm is beyond any model of this kind: the proof that configuration 1 is not reproducible as printed.
+    A chord cannot be longer than its arc, and a compressed segment not longer than 50 mm, so a simulated
+    chord above 50 mm is beyond any model of this kind: the proof that configuration 1 is not reproducible as
+    printed.
 
     Returns
     -------
@@ -70,7 +72,8 @@ def segment_chords() -> pd.DataFrame:
     for configuration in range(4):
         for index, segment in enumerate(("proximal", "distal")):
             chords = [
-                np.linalg.norm(np.diff(printed_positions(kind)[configuration, index : index + 2], axis=0)) * 1e3
+                np.linalg.norm(np.diff(printed_positions(kind)[configuration, index : index + 2], axis=0))
+                * 1e3
                 for kind in ("sim", "exp")
             ]
             rows.append((configuration, segment, *chords))
