@@ -142,18 +142,15 @@ def equations() -> list[str]:
 
 
 def data(root: Path = ROOT) -> list[str]:
-    """Return data files that have no card, or are not what their card describes."""
-    by_hand = {"published.csv", "equations.csv", "errata.csv", "card.toml"}
-    files = [
-        path for path in sorted((root / "data").rglob("*")) if path.is_file() and path.name not in by_hand
-    ]
+    """Return data files without a card, or not as their card says; TOML files speak for themselves."""
+    by_hand = {"published.csv", "equations.csv", "errata.csv"}
+    files = {path for path in (root / "data").rglob("*") if path.is_file() and path.name not in by_hand}
+    cards = {path for path in files if path.name.endswith(".card.toml")}
+    described = {path.with_name(path.name.removesuffix(".card.toml")) for path in cards}
     problems = []
-    for path in files:
+    for path in sorted(described | {path for path in files if path.suffix != ".toml"}):
         try:
-            target = path.with_name(path.name.removesuffix(".card.toml"))
-            if path.name.endswith(".card.toml") and target.is_file():
-                continue
-            datacards.verified(target)
+            datacards.verified(path)
         except datacards.DataCardError as error:
             problems.append(str(error).replace(f"{root}/", ""))
     return problems

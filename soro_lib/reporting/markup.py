@@ -2,6 +2,7 @@
 
 import html
 import math
+import re
 from collections.abc import Sequence
 
 import pandas as pd
@@ -12,8 +13,8 @@ VERDICT_COLORS = {
     "reproduced": "#0a7f5a",
     "close": "#3b7ea1",
     "differs": "#c2571a",
-    "calibrated": "#7a7a7a",
-    "not attempted": "#a8a8a8",
+    "calibrated": "#5b6b8c",
+    "not attempted": "#808080",
 }
 """Background of each verdict's badge."""
 
@@ -22,6 +23,8 @@ _STYLE = """<style>
 .soro-table th, .soro-table td {text-align: left; vertical-align: top; padding: 4px 8px}
 .soro-table th {border-bottom: 1.5px solid currentColor; white-space: nowrap}
 .soro-table td {border-bottom: 1px solid rgba(128,128,128,.25)}
+.soro-table td:first-child {min-width: 4.5em}
+.soro-table code {white-space: normal}
 .soro-table td.number {text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap}
 .soro-badge {color: white; border-radius: 3px; padding: 1px 7px; white-space: nowrap; font-size: 0.92em}
 .soro-card {border-left: 4px solid #0072B2; padding: 2px 0 2px 16px; margin: 4px 0 12px 0}
@@ -76,17 +79,13 @@ def _markdown_cell(cell: str) -> str:
 
 
 SCORECARD_HEADER = (
-    "where",
-    "quantity",
-    "unit",
-    "published",
-    "ours",
-    "95 % interval",
-    "seeds",
-    "verdict",
-    "why",
+    *("where", "quantity", "kind", "unit", "published", "ours", "95 % interval", "seeds"),
+    *("verdict", "why"),
 )
 """The columns of a scorecard as shown; the CSV holds more."""
+
+
+VERDICT_COLUMN = SCORECARD_HEADER.index("verdict")
 
 
 def scorecard_cells(scorecard: pd.DataFrame) -> list[list[str]]:
@@ -95,6 +94,7 @@ def scorecard_cells(scorecard: pd.DataFrame) -> list[list[str]]:
         [
             row["location"],
             row["quantity"],
+            row["kind"],
             row["unit"],
             number_text(row["published"]),
             number_text(row["ours"]),
@@ -111,8 +111,8 @@ def scorecard_html(scorecard: pd.DataFrame) -> str:
     """Return a scorecard as an HTML table, the verdicts as coloured badges."""
     rows = [[html.escape(cell) for cell in cells] for cells in scorecard_cells(scorecard)]
     for cells in rows:
-        cells[7] = _badge(html.unescape(cells[7]))
-    return html_table(SCORECARD_HEADER, rows, numbers=(3, 4, 5, 6))
+        cells[VERDICT_COLUMN] = _badge(cells[VERDICT_COLUMN])
+    return html_table(SCORECARD_HEADER, rows, numbers=(4, 5, 6, 7))
 
 
 def scorecard_markdown(scorecard: pd.DataFrame) -> str:
@@ -127,12 +127,18 @@ def frame_html(frame: pd.DataFrame, code: Sequence[str] = ()) -> str:
     ]
     rows = [
         [
-            f"<code>{_cell(value)}</code>" if name in code and value else _cell(value)
+            _code(str(value)) if name in code else _cell(value)
             for name, value in zip(frame.columns, record, strict=True)
         ]
         for record in frame.itertuples(index=False, name=None)
     ]
     return html_table([str(name) for name in frame.columns], rows, numbers=numeric)
+
+
+def _code(path: str) -> str:
+    """Return a dotted path or test name in typewriter that may break after any of its separators."""
+    breakable = re.sub(r"([._/:]+)", r"\1<wbr>", html.escape(path))
+    return f"<code>{breakable}</code>"
 
 
 def _cell(value: object) -> str:

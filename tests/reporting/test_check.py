@@ -115,6 +115,7 @@ def test_data_without_card_or_changed_is_told(tmp_path):
     folder = tmp_path / "data" / "paper"
     folder.mkdir(parents=True)
     (folder / "published.csv").write_text("written by hand")
+    (folder / "plant.toml").write_text("speaks = true")
     (folder / "run.csv").write_text("time\n1\n")
     assert "data/paper/run.csv.card.toml: no such card" in check.data(tmp_path)[0]
     columns = {"time": "[s] since start"}

@@ -100,7 +100,7 @@ def test_scorecard_card_indices_are_shown_and_written(tmp_path, write_paper, sho
     card, equations, errata, scorecard = shown
     assert "A. Author, B. Author" in card
     assert "needs a sensor" in card
-    assert "soro_lib.arcs.arc_transform" in equations
+    assert "<code>soro_<wbr>lib.<wbr>arcs.<wbr>arc_<wbr>transform</code>" in equations
     assert "a rotation has determinant 1" in errata
     for word in ("reproduced", "not attempted", "needs the force sensor", "[1.2, 1.4]"):
         assert word in scorecard
