@@ -56,16 +56,10 @@ def imported_names(source: str, package: str = "") -> frozenset[str]:
 
 
 @cache
-def data_slugs(source: str) -> frozenset[str]:
-    """Return the papers whose data folder is named in a call ``data_directory("<slug>")``."""
-    return frozenset(
-        str(call.args[0].value)
-        for call in ast.walk(_parse(source))
-        if isinstance(call, ast.Call)
-        and ast.unparse(call.func).split(".")[-1] == "data_directory"
-        and call.args
-        and isinstance(call.args[0], ast.Constant)
-    )
+def texts(source: str) -> frozenset[str]:
+    """Return the string literals of code."""
+    constants = (node.value for node in ast.walk(_parse(source)) if isinstance(node, ast.Constant))
+    return frozenset(value for value in constants if isinstance(value, str))
 
 
 def _parse(source: str) -> ast.Module:

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from soro_lib.workbook.imports import data_slugs, dependencies
+from soro_lib.workbook.imports import dependencies, texts
 from soro_lib.workbook.notebooks import OVERVIEW, Notebook
 
 
@@ -59,29 +59,21 @@ def current_inputs(
     parameter names. The overview follows from the scorecards and file names of all the others.
     """
     modules = dependencies(notebook.code, root)
-    texts = [*notebook.code, *(path.read_text(encoding="utf-8") for path in modules)]
-    slugs = {notebook.slug}.union(*map(data_slugs, texts))
-    files = modules | _package_data(modules)
-    for slug in slugs:
-        files |= _visible_files(root / "data" / slug)
-    if notebook.slug == OVERVIEW:
-        files |= {path for path in (root / "data").glob("*/*") if path.suffix in {".csv", ".toml"}}
-        others = [path for path in _figures_to_read(root, figures) if path.parent.name != OVERVIEW]
-        files |= {path for path in others if path.name == "scorecard.csv"}
-        names = [f"{path.parent.name}/{path.name}" for path in others]
-    else:
-        names = []
-    files |= {
-        Path(value) for value in parameters.values() if isinstance(value, str) and Path(value).is_file()
-    }
+    named = {Path(value) for value in parameters.values() if isinstance(value, str)}
+    files = modules | _package_data(modules) | _data(notebook, modules, root) | named
     cells = [[cell.cell_type, cell.source, cell.metadata.get("tags", [])] for cell in notebook.cells]
+    others: set[Path] = set()
+    if notebook.slug == OVERVIEW:
+        others = {path for path in _figures_to_read(root, figures) if path.parent.name != OVERVIEW}
+        files |= {path for path in others if path.name == "scorecard.csv"}
+        files |= {path for path in (root / "data").glob("*/*") if path.suffix in {".csv", ".toml"}}
     return {
-        "notebook": _digest(json.dumps(cells)),
-        "parameters": _digest(json.dumps(parameters, sort_keys=True)),
+        "notebook": _digest(cells),
+        "parameters": _digest(parameters),
         "Python version": f"{sys.version_info.major}.{sys.version_info.minor}",
         "environment.txt": _digest_file(root / "environment.txt"),
-        "names of the figures": _digest(json.dumps(sorted(names))),
-        **{_shown(path, root): _digest_file(path) for path in sorted(files)},
+        "names of the figures": _digest(sorted(f"{path.parent.name}/{path.name}" for path in others)),
+        **{_shown(path, root): _digest_file(path) for path in sorted(files) if path.is_file()},
     }
 
 
@@ -95,6 +87,15 @@ def current_outputs(directory: Path) -> dict[str, str]:
 
 def _visible_files(directory: Path) -> set[Path]:
     return {path for path in directory.rglob("*") if path.is_file() and not path.name.startswith(".")}
+
+
+def _data(notebook: Notebook, modules: set[Path], root: Path) -> set[Path]:
+    """Return the files of the notebook's own data folder and of those named in its code or its modules."""
+    # The module that knows the folders names them all.
+    sources = [path.read_text(encoding="utf-8") for path in modules if path.name != "project.py"]
+    mentioned = {notebook.slug}.union(*map(texts, [*notebook.code, *sources]))
+    folders = [folder for folder in (root / "data").glob("*") if folder.name in mentioned]
+    return {path for folder in folders for path in _visible_files(folder)}
 
 
 def _package_data(modules: set[Path]) -> set[Path]:
@@ -113,8 +114,8 @@ def _shown(path: Path, root: Path) -> str:
     return path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)
 
 
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
+def _digest(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
 def _digest_file(path: Path) -> str:
