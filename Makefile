@@ -13,9 +13,10 @@ ONLY =
 FORCE = $(if $(findstring B,$(firstword -$(MAKEFLAGS))),--force)
 RUNNER_OPTIONS = $(FORCE) $(if $(JOBS),--jobs $(JOBS)) $(foreach slug,$(ONLY),--only $(slug))
 
-# A calibration, and a study that ships simulated data, writes its files when it is run as a module.
-CALIBRATIONS = $(subst /,.,$(basename $(wildcard soro_lib/calibrations/[a-z]*.py)))
-GENERATORS = $(subst /,.,$(patsubst %/__main__.py,%,$(wildcard soro_lib/studies/*/__main__.py)))
+# What fits a plant or simulates recordings writes its files when it is run as a module.
+MODULES_TO_RUN = $(subst /,.,$(patsubst %/__main__,%,$(basename $(shell grep -rl --include='*.py' '__name__ == "__main__"' $(1)))))
+CALIBRATIONS = $(call MODULES_TO_RUN,soro_lib/calibrations)
+GENERATORS = $(call MODULES_TO_RUN,soro_lib/studies)
 
 help: ## list the commands
 	@echo "make <command>  [JOBS=n: notebooks at once]  [ONLY=slug: this notebook]  [PYTHON=interpreter]"

@@ -57,7 +57,9 @@ def imported_names(source: str, package: str = "") -> frozenset[str]:
 
 @cache
 def texts(source: str) -> frozenset[str]:
-    """Return the string literals of code."""
+    """Return the string literals of code, apart from the names of a lazily imported package."""
+    if _lazy_names(source):
+        return frozenset()
     constants = (node.value for node in ast.walk(_parse(source)) if isinstance(node, ast.Constant))
     return frozenset(value for value in constants if isinstance(value, str))
 
@@ -103,7 +105,7 @@ def _files(dotted: str, root: Path) -> set[Path]:
 @cache
 def _lazy_names(init: str) -> dict[str, str]:
     """Return name -> submodule of the ``lazy_loader.attach`` call of a package, empty if it has none."""
-    for node in ast.walk(ast.parse(init)):
+    for node in ast.walk(_parse(init)):
         if isinstance(node, ast.keyword) and node.arg == "submod_attrs":
             modules = ast.literal_eval(node.value)
             return {name: module for module, names in modules.items() for name in names}
