@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from soro_lib.project import ROOT, SLUGS
 from soro_lib.reporting import card, equations, published
 
 PUBLISHED = """id,location,quantity,value,unit,kind,role,tolerance,note
@@ -48,3 +49,11 @@ def write_paper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...
     for module in (card, equations, published):
         monkeypatch.setattr(module, "data_directory", lambda slug: tmp_path / "data" / slug)
     return write
+
+
+@pytest.fixture(params=SLUGS)
+def slug(request: pytest.FixtureRequest) -> str:
+    """Return every paper that has a notebook."""
+    if not list((ROOT / "notebooks").glob(f"*_{request.param}.ipynb")):
+        pytest.skip(f"no notebook of {request.param} yet")
+    return request.param
