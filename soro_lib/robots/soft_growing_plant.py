@@ -28,6 +28,9 @@ Vector = tuple[float, float, float]
 SAMPLE_TIME = 0.01
 """Period of the control loop [s] (Stroppa et al., Table 3: 100 Hz)."""
 
+TRACKING_RATE = 270.0
+"""Rate of the motion capture [Hz] (Stroppa et al., Section 3.3.1)."""
+
 REFERENCE_LENGTH = 0.65
 """Length at which the gains and lags of the real arm are stated [m]: tip at the items."""
 
@@ -152,7 +155,7 @@ def real_arm(tracking_noise: float | None = None) -> PlantParameters:
     centres of the items. The tracker is taken to see a marker within 0.1 mm per frame; the centroid of 8
     markers, averaged over the 2.7 frames of a control period (270 Hz to 100 Hz), leaves 0.02 mm.
     """
-    centroid = 1e-4 / math.sqrt(8 * 2.7) if tracking_noise is None else tracking_noise
+    centroid = 1e-4 / math.sqrt(8 * TRACKING_RATE * SAMPLE_TIME) if tracking_noise is None else tracking_noise
     return PlantParameters(real=True, command_delay=0.15, floor=0.67, tracking_noise=centroid)
 
 

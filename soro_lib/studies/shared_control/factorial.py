@@ -178,28 +178,30 @@ def _check_balanced(trials: pd.DataFrame) -> None:
 
 @dataclass(frozen=True)
 class Contrast:
-    """A difference of means: its words and the sets of levels whose means are subtracted."""
+    """A difference of means: its words, the sets of levels whose means are subtracted, the claimed sign."""
 
     name: str
     text: str
     response: str
     high: Mapping[str, int]
     low: Mapping[str, int]
+    sign: float
 
 
 CONTRASTS = (
-    Contrast("fmax_time", "f_MAX high", "time_s", {"f_max": 1}, {"f_max": 0}),
-    Contrast("fmax_path", "f_MAX high", "path_m", {"f_max": 1}, {"f_max": 0}),
-    Contrast("fmax_assistance", "f_MAX high", "assistance_n", {"f_max": 1}, {"f_max": 0}),
-    Contrast("xi_time", "xi_A and xi_S low", "time_s", {"xi_a": 0, "xi_s": 0}, {"xi_a": 1, "xi_s": 1}),
-    Contrast("xi_a_path", "xi_A low", "path_m", {"xi_a": 0}, {"xi_a": 1}),
-    Contrast("xi_s_path", "xi_S low", "path_m", {"xi_s": 0}, {"xi_s": 1}),
+    Contrast("fmax_time", "f_MAX high", "time_s", {"f_max": 1}, {"f_max": 0}, -1.0),
+    Contrast("fmax_path", "f_MAX high", "path_m", {"f_max": 1}, {"f_max": 0}, -1.0),
+    Contrast("fmax_assistance", "f_MAX high", "assistance_n", {"f_max": 1}, {"f_max": 0}, 1.0),
+    Contrast("xi_time", "xi_A and xi_S low", "time_s", {"xi_a": 0, "xi_s": 0}, {"xi_a": 1, "xi_s": 1}, -1.0),
+    Contrast("xi_a_path", "xi_A low", "path_m", {"xi_a": 0}, {"xi_a": 1}, -1.0),
+    Contrast("xi_s_path", "xi_S low", "path_m", {"xi_s": 0}, {"xi_s": 1}, -1.0),
     Contrast(
         "kmax_assistance",
         "k_MAX low at xi_S high",
         "assistance_n",
         {"k_max": 0, "xi_s": 1},
         {"k_max": 1, "xi_s": 1},
+        1.0,
     ),
 )
 """The effects that the paper reports, in its signs."""

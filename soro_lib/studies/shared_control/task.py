@@ -60,6 +60,8 @@ from soro_lib.robots.soft_growing_plant import (
     tracked_tip,
 )
 
+UNASSISTED, AS_NEEDED, FIXED = range(len(ASSISTANCES))
+
 AUTOMATIC_LAG = 0.19
 """Lag with which an automatic axis takes up its goal [s]: 5 % of the gap per 10 ms, as programmed."""
 
@@ -277,18 +279,20 @@ def carry(rule: TaskRule, items: NDArray[np.float64], before: int, after: int, t
 
 @register_jitable
 def assist(
-    rule: TaskRule, state: TaskState, memory: TaskMemory, tip: Vector, goal: Vector
+    rule: TaskRule,
+    assisted: AssistState,
+    fixed: FixedState,
+    window: NDArray[np.float64],
+    tip: Vector,
+    goal: Vector,
 ) -> tuple[AssistState, FixedState, float, Vector]:
     """The assistance of the paradigm: its states, |f| and the rendered force [N]."""
-    assisted, fixed, magnitude = state.assist, state.fixed, 0.0
-    if rule.assistance == 0:
-        return assisted, fixed, 0.0, (0.0, 0.0, 0.0)
     distance = distance_to_goal(tip, goal)
-    if rule.assistance == 1:
+    if rule.assistance == AS_NEEDED:
         assisted = assist_step(rule.assist, assisted, distance, 1.0)
         magnitude = hooke_magnitude(assisted.stiffness, distance, rule.assist_maximum)
     else:
-        fixed = fixed_step(rule.fixed, fixed, memory.window, distance, 1.0)
+        fixed = fixed_step(rule.fixed, fixed, window, distance, 1.0)
         magnitude = fixed.magnitude
     return assisted, fixed, magnitude, guidance_force(magnitude, tip, goal, rule.unit_direction)
 
@@ -329,8 +333,10 @@ def task_step(
     item = state.gripper.item
     if item != NOTHING and state.closed and not closed:
         opening_error = horizontal(tip, rule.targets[item])
-    gripper = gripper_step(rule.gripper, state.gripper, memory.items, tip, desired, closed, rng)
-    carry(rule, memory.items, item, gripper.item, tip)
+    gripper = state.gripper
+    if closed or item != NOTHING:
+        gripper = gripper_step(rule.gripper, gripper, memory.items, tip, desired, closed, rng)
+        carry(rule, memory.items, item, gripper.item, tip)
     if item == NOTHING and gripper.item != NOTHING:
         memory.releases[gripper.item, 3] = time
     elif item != NOTHING and gripper.item == NOTHING and state.goal.phase == PLACING:
@@ -341,7 +347,9 @@ def task_step(
     tracked = tracked_tip(tip, rule.plant.tracking_noise, rng)
     held = confirmed if rule.confirmed_by_hand else gripper.item != NOTHING
     goal = goal_step(rule.goals, state.goal, tracked, held)
-    assisted, fixed, magnitude, force = assist(rule, state, memory, tracked, goal.goal)
+    assisted, fixed, magnitude, force = state.assist, state.fixed, 0.0, (0.0, 0.0, 0.0)
+    if rule.assistance != UNASSISTED:
+        assisted, fixed, magnitude, force = assist(rule, assisted, fixed, memory.window, tracked, goal.goal)
 
     size = distance_to_goal((0.0, 0.0, 0.0), force)
     tally = Tally(
@@ -494,7 +502,9 @@ class Trial:
             desired=np.array(state.desired),
             goal=np.array(state.goal.goal),
             force=np.array(state.force),
-            stiffness=state.assist.stiffness if self.rule.assistance == 1 else self._fixed_stiffness(),
+            stiffness=state.assist.stiffness
+            if self.rule.assistance == AS_NEEDED
+            else self._fixed_stiffness(),
             magnitude=state.magnitude,
             motion=MOTIONS[state.assist.motion],
             phase=PHASES[state.goal.phase],
@@ -505,4 +515,4 @@ class Trial:
         )
 
     def _fixed_stiffness(self) -> float:
-        return self.rule.fixed.stiffness if self.rule.assistance == 2 else 0.0
+        return self.rule.fixed.stiffness if self.rule.assistance == FIXED else 0.0
