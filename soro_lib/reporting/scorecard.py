@@ -60,6 +60,7 @@ def confidence_interval(finding: Finding) -> tuple[float, float]:
         (np.asarray(finding.samples),),
         STATISTICS[finding.statistic],
         n_resamples=policy.BOOTSTRAP_RESAMPLES,
+        batch=max(1, 1_000_000 // finding.seeds),  # bounds the memory where the samples are many
         confidence_level=policy.CONFIDENCE,
         method="percentile",
         rng=np.random.default_rng(policy.BOOTSTRAP_SEED),
