@@ -41,10 +41,11 @@ test: env ## run all tests, and every notebook with small parameters
 	@$(RUN) pytest -n logical --dist worksteal
 
 check: env ## lint, types, and whether what is committed is what the notebooks produce
-	@$(RUN) ruff check .
-	@$(RUN) ruff format --check .
-	@$(RUN) mypy
-	@$(RUN) soro_lib.reporting.check
+	@status=0; \
+	for step in "ruff check ." "ruff format --check ." mypy soro_lib.reporting.check; do \
+	    $(RUN) $$step || status=1; \
+	done; \
+	exit $$status
 
 lab: env ## open JupyterLab on the overview notebook
 	@$(RUN) jupyterlab notebooks/00_overview.ipynb
