@@ -109,7 +109,7 @@ class FibreGratings:
         Returns
         -------
         ndarray (..., gratings)
-            Stretch of the backbone minus bending on the inner side [-].
+            Stretch of the backbone, less on the inner side of the bend [-].
 
         Raises
         ------
@@ -121,9 +121,9 @@ class FibreGratings:
             raise ValueError(f"configuration must be finite and (..., n, 3), got shape {arcs.shape}")
         segment = np.minimum((self.height / self.length * arcs.shape[-2]).astype(int), arcs.shape[-2] - 1)
         curvature = (arcs[..., :2] / arcs[..., 2:])[..., segment, :]
-        stretch = arcs[..., 2].sum(axis=-1)[..., None] / self.length - 1.0
+        stretch = arcs[..., 2].sum(axis=-1)[..., None] / self.length
         sideways = curvature[..., 0] * np.cos(self.azimuth) + curvature[..., 1] * np.sin(self.azimuth)
-        strain = stretch - self.radius * sideways
+        strain = stretch * (1.0 - self.radius * sideways) - 1.0
         if elongations is not None:
             around = self.azimuth[:, None] - np.deg2rad([90.0, 210.0, 330.0])
             bump = np.exp(3.0 * (np.cos(around) - 1.0))
