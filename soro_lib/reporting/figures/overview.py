@@ -34,20 +34,21 @@ def four_arms(specimens: Sequence[Specimen], poses: int = 5) -> Figure:
 def one_arm(specimen: Specimen, actuation: ArrayLike) -> Figure:
     """Draw one arm alone: what an explorer shows where nobody can move its sliders."""
     figure, axes = new_figure(4.0, 4.0, projection="3d")
-    draw_arm(axes, specimen, actuation)
+    draw_arm(axes, specimen, actuation, width=11.0)
     _frame(axes, specimen, np.atleast_2d(actuation))
     return figure
 
 
-def draw_arm(axes: Any, specimen: Specimen, actuation: ArrayLike, strength: float = 1.0) -> None:
-    """Draw the pieces of an arm [mm] as shaded tubes; a low strength makes them a pale ghost."""
+def draw_arm(
+    axes: Any, specimen: Specimen, actuation: ArrayLike, strength: float = 1.0, width: float = 5.0
+) -> None:
+    """Draw the pieces of an arm [mm] as tubes `width` points wide; a low strength makes them a pale ghost."""
     pieces = 1e3 * specimen.pieces(actuation)
+    layers = ((1.0, 0.72), (0.76, 1.0), (0.28, 1.45)) if strength == 1.0 else ((0.9, 1.0),)
     for order, (piece, color) in enumerate(zip(pieces, piece_colors(specimen, len(pieces)), strict=True)):
-        for width, shade in ((5.0, 0.72), (3.8, 1.0), (1.4, 1.45)) if strength == 1.0 else ((4.5, 1.0),):
-            tint = _shaded(color, shade, strength)
-            axes.plot(
-                *piece.T, color=tint, linewidth=width, zorder=10 * strength + order, solid_capstyle="butt"
-            )
+        for share, shade in layers:
+            line = {"color": _shaded(color, shade, strength), "linewidth": share * width}
+            axes.plot(*piece.T, **line, zorder=10 * strength + order, solid_capstyle="butt")
 
 
 def _shaded(color: str, shade: float, strength: float) -> tuple[float, ...]:
@@ -66,12 +67,12 @@ def _frame(axes: Any, specimen: Specimen, actuations: ArrayLike) -> None:
     if specimen.hangs:
         axes.invert_zaxis()
         axes.invert_yaxis()
-    axes.set_title(specimen.name, loc="center", y=1.06)
-    axes.text2D(0.5, 1.03, f"{specimen.source}, in mm", transform=axes.transAxes, ha="center", fontsize=7.5)
+    axes.set_title(specimen.name, loc="center", pad=13)
+    source = f"{specimen.source}, in mm"
+    axes.text2D(0.5, 1.0, source, transform=axes.transAxes, ha="center", va="bottom", fontsize=7.5)
     axes.tick_params(labelsize=6, pad=-3)
     axes.locator_params(nbins=4)
     axes.set_xlabel("x", fontsize=7, labelpad=-8)
-    axes.set_zlabel("z", fontsize=7, labelpad=-8)
     axes.set_yticklabels([])
     axes.view_init(elev=15, azim=-68)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
