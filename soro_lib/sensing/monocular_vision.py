@@ -97,7 +97,7 @@ class TrackerSettings:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not 0 < value < np.inf:
-                raise ValueError(f"TrackerSettings.{name} must be finite and above 0, got {value}")
+                raise ValueError(f"{name} must be finite and above 0, got {value}")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The tracker on rendered films: it finds the truth, knows when it is lost, comes back, and refuses nonsense."""
+"""The tracker on rendered films: it finds the truth, knows when it is lost, and comes back."""
 
 import numpy as np
 import pytest
@@ -174,7 +174,7 @@ def test_images_of_the_wrong_size_or_type_are_refused(image):
 
 
 def test_settings_check_themselves():
-    with pytest.raises(ValueError, match="TrackerSettings.ratio"):
+    with pytest.raises(ValueError, match="ratio must be finite"):
         TrackerSettings(ratio=0.0)
 
 

@@ -76,6 +76,9 @@ COLUMNS = {
     "qy": "[-] tip orientation by the camera",
     "qz": "[-] tip orientation by the camera",
     "qw": "[-] tip orientation by the camera, scalar",
+    "true_x_mm": "[mm] true tip position, never shown to the tracker",
+    "true_y_mm": "[mm] true tip position",
+    "true_z_mm": "[mm] true tip position, down",
 }
 """Columns of a recording, with units."""
 
@@ -168,7 +171,8 @@ def fly(
         for step in range(steps):
             conditions = flight.timeline(motion.time[step])
             frame = tracker.track(photograph(scene, motion.pose[step], conditions, _noise(rng)))
-            rows.append(_row(motion.time[step], conditions.phase, frame, similarity))
+            row = _row(motion.time[step], conditions.phase, frame, similarity)
+            rows.append([*row, *1e3 * motion.pose[step, :3]])
             if report is not None:
                 report(step + 1)
     rotation, scale, translation = similarity
