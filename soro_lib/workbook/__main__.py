@@ -54,7 +54,8 @@ def _run(options: argparse.Namespace, root: Path) -> int:
     parameters = parameter_values(notebooks, texts)
     places = Places.of(root, options.output, options.quick, changed=bool(options.parameter))
     display = Display()
-    run = Run(places, notebooks, parameters, options.jobs, options.force, options.timeout, display)
+    jobs = min(options.jobs, len(notebooks))
+    run = Run(places, notebooks, parameters, jobs, options.force, options.timeout, display)
     try:
         outcomes = run.start()
     except Stopped as stopped:

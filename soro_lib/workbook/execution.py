@@ -80,6 +80,8 @@ class Execution:
         Interrupted
             If `kill` was called.
         """
+        # The kernel of this environment, not one of the same name that the user has installed.
+        os.environ["JUPYTER_PREFER_ENV_PATH"] = "1"
         try:
             papermill.execute_notebook(
                 self.notebook.path,
@@ -94,7 +96,8 @@ class Execution:
         except Exception as error:
             if self.interrupted:
                 raise Interrupted(self.notebook.slug) from None
-            raise NotebookFailure(f"code cell {self.cell}: {self._explain(error)}") from error
+            where = f"code cell {self.cell}" if self.cell else "before the first cell"
+            raise NotebookFailure(f"{where}: {self._explain(error)}") from error
 
     def kill(self) -> None:
         """End the kernel and everything that it has started, at once."""
@@ -185,6 +188,5 @@ def kernel_environment(root: Path, output: Path, figures: Path, scratch: Path, j
         "MATPLOTLIBRC": str(matplotlib / "mpl-data" / "matplotlibrc"),
         "LOKY_MAX_CPU_COUNT": str(max(1, cores() // jobs)),
         "IPYTHONDIR": str(scratch / "ipython"),
-        "JUPYTER_PREFER_ENV_PATH": "1",
         "PYDEVD_DISABLE_FILE_VALIDATION": "1",
     }

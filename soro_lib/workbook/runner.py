@@ -192,7 +192,8 @@ class Run:
         (self.places.build / "failed" / notebook.path.name).unlink(missing_ok=True)
         kept = self.places.build / folder / notebook.path.name
         kept.parent.mkdir(parents=True, exist_ok=True)
-        shutil.move(self.places.staging / notebook.slug / notebook.path.name, kept)
+        with suppress(FileNotFoundError):  # nothing is written where not even the kernel has started
+            shutil.move(self.places.staging / notebook.slug / notebook.path.name, kept)
         return kept
 
 
