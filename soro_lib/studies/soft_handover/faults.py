@@ -19,7 +19,7 @@ from soro_lib.robots.helix_plant import Hand, HelixPlant, TendonMotors
 from soro_lib.sensing.handover_observation import HandoverObservation, Observer
 from soro_lib.studies.soft_handover.handover import Scene, run_handover
 
-ONSET = 5
+ONSET = 2
 """Step at which a fault sets in."""
 
 Change = Callable[[HandoverObservation, int, np.random.Generator], HandoverObservation]

@@ -208,7 +208,7 @@ def time_findings(tables: HandoverTables, timestep: Mapping[float, float]) -> di
             on_e = elastic.loc[elastic["alpha"] == step_size, f"{statistic}_s"].mean()
             result[f"table1_{statistic}_{round(10 * step_size):02d}"] = Finding(
                 blocks[f"{statistic}_s"],
-                f"steps times the thesis's timestep; plant E: {on_e:.1f} s; no friction or creep is simulated",
+                f"steps times the thesis's timestep; plant E: {on_e:.1f} s; no friction and creep left out",
             )
     median = times.pivot(index="block", columns="alpha", values="median_s")
     result["s51_ratio_01_02"] = Finding(
