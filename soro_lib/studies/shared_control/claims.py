@@ -234,6 +234,29 @@ def claim_probabilities(held: pd.DataFrame) -> pd.DataFrame:
     return held.groupby(columns, sort=False)["holds"].mean().rename("probability").reset_index()
 
 
+def condition_probabilities(trials: pd.DataFrame) -> pd.DataFrame:
+    """Probability of each claim under every attitude, force law and approach.
+
+    Parameters
+    ----------
+    trials : pandas.DataFrame
+        Of `run_conditions`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As `claim_probabilities`, with the columns attitude, law and approach.
+    """
+    conditions = ["attitude", "law", "approach"]
+    pieces = [
+        claim_probabilities(evaluate_claims(group)).assign(
+            **dict(zip(conditions, map(str, condition), strict=True))
+        )
+        for condition, group in trials.groupby(conditions, sort=False)
+    ]
+    return pd.concat(pieces, ignore_index=True)
+
+
 Record = tuple[str, str, str, str, NDArray[np.bool_]]
 
 

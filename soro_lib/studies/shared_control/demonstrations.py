@@ -52,6 +52,7 @@ def demonstration_plans(
     approach_height: float = 0.1,
     kinds: Sequence[str] = KINDS,
     environments: Sequence[str] = ENVIRONMENTS,
+    paradigms: Sequence[str] = tuple(PARADIGMS),
     **settings: Any,
 ) -> Iterator[TrialPlan]:
     """Every operator of every kind through every paradigm in every environment.
@@ -70,7 +71,7 @@ def demonstration_plans(
         To the guidance force.
     approach_height : float
         0.1 m: from above, as the paper says; 0: in a straight line.
-    kinds, environments : sequence of str
+    kinds, environments, paradigms : sequence of str
     **settings
         Passed on to `TaskSettings` (force_law, detection_error, ...).
     """
@@ -79,8 +80,8 @@ def demonstration_plans(
         place = ENVIRONMENTS.index(environment)
         for kind in kinds:
             people = draw_operators(kind, operators, seed + 1000 * place, **changes)
-            for name, paradigm in PARADIGMS.items():
-                setting = TaskSettings(paradigm, environment=environment, **settings)  # type: ignore[arg-type]
+            for name in paradigms:
+                setting = TaskSettings(PARADIGMS[name], environment=environment, **settings)  # type: ignore[arg-type]
                 for person, operator in enumerate(people):
                     for trial in range(trials):
                         chance = (seed, 2, place, KINDS.index(kind), person, trial)
@@ -99,6 +100,52 @@ def run_demonstrations(
 ) -> pd.DataFrame:
     """Simulate the demonstrations; one line per trial. Options as in `demonstration_plans`."""
     return simulate(demonstration_plans(operators, seed, **options), jobs=jobs, scheduler=scheduler)
+
+
+GUIDED = ("assist_as_needed", "fixed_assistance")
+"""Paradigms that the force law and the attitude to the force concern."""
+
+
+def run_conditions(
+    operators: int, seed: int, trials: int = 2, jobs: int = 1, scheduler: Any = None
+) -> pd.DataFrame:
+    """The demonstrations under every attitude, force law, and way to approach.
+
+    The paradigms without a force are simulated once for each approach and serve every attitude and law.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As `run_demonstrations`, with the columns attitude, law and approach before.
+    """
+
+    def plans() -> Iterator[TrialPlan]:
+        for approach, height in APPROACHES.items():
+            free = [name for name in PARADIGMS if name not in GUIDED]
+            cases: list[tuple[str, str, Sequence[str]]] = [("any", "any", free)]
+            cases += [(attitude, law, GUIDED) for attitude in ATTITUDES for law in ("printed", "program")]
+            for attitude, law, paradigms in cases:
+                options = {"attitude": "ignore", "force_law": "printed"}
+                if attitude != "any":
+                    options = {"attitude": attitude, "force_law": law}
+                condition = {"attitude": attitude, "law": law, "approach": approach}
+                for plan in demonstration_plans(
+                    operators, seed, trials, approach_height=height, paradigms=paradigms, **options
+                ):
+                    yield replace(plan, labels={**condition, **plan.labels})
+
+    table = simulate(plans(), jobs=jobs, scheduler=scheduler)
+    unforced = table[table["attitude"] == "any"]
+    copies = [
+        unforced.assign(attitude=attitude, law=law)
+        for attitude in ATTITUDES
+        for law in ("printed", "program")
+    ]
+    return pd.concat([*copies, table[table["attitude"] != "any"]], ignore_index=True)
+
+
+APPROACHES = {"from above": 0.1, "straight": 0.0}
+"""How much higher the operators aim while far away [m]."""
 
 
 def summary(trials: pd.DataFrame, resamples: int = 2000, seed: int = 0) -> pd.DataFrame:
