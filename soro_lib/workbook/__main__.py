@@ -2,13 +2,14 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from soro_lib.project import ROOT
 from soro_lib.workbook.display import Display
 from soro_lib.workbook.execution import cores
 from soro_lib.workbook.notebooks import (
+    Notebook,
     NotebookError,
     ParameterError,
     describe,
@@ -26,8 +27,8 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
     Zero if all went well, 1 if a notebook failed, 2 if the request made no sense, 128 + signal if stopped.
     """
     options = _parser().parse_args(arguments)
-    notebooks = find_notebooks(root / "notebooks")
     try:
+        notebooks = find_notebooks(root / "notebooks")
         if options.command == "list":
             print(describe(notebooks))
             return 0
@@ -35,14 +36,14 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
             places = Places.of(root, options.output, options.quick, changed=False)
             print(f"open {export(notebooks, places)}")
             return 0
-        return _run(options, root)
+        return _run(options, notebooks, root)
     except (NotebookError, ParameterError, AlreadyRunning, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
 
 
-def _run(options: argparse.Namespace, root: Path) -> int:
-    notebooks = select(find_notebooks(root / "notebooks"), options.only)
+def _run(options: argparse.Namespace, notebooks: Mapping[str, Notebook], root: Path) -> int:
+    notebooks = select(notebooks, options.only)
     texts = dict(options.parameter)
     if texts and not options.only:
         concerned = [
