@@ -133,7 +133,7 @@ class Notebook:
 
 
 def find_notebooks(directory: Path) -> dict[str, Notebook]:
-    """Return the numbered notebooks of a folder by slug, in their order; `NotebookError` if there are none."""
+    """Return the numbered notebooks of a folder by slug, in order; `NotebookError` if there are none."""
     notebooks = [Notebook(path) for path in sorted(directory.glob("[0-9][0-9]_*.ipynb"))]
     if not notebooks:
         raise NotebookError(f"no notebook NN_<slug>.ipynb in {directory}")
