@@ -182,6 +182,28 @@ def _offset(angle: Array) -> Array:
     return np.sin(half) * np.sinc(half / np.pi)
 
 
+@dataclass(frozen=True)
+class Wall:
+    """A smooth rod beside the arm that lets it bend only so far to one side; friction is left out.
+
+    Attributes
+    ----------
+    direction : float
+        Side of the rod, from x toward y [rad].
+    limit : float
+        Largest bending angle toward it [rad].
+    """
+
+    direction: float
+    limit: float
+
+    def stop(self, bending: Array) -> Array:
+        """Bending angles ``(..., 2)`` after the rod took away what goes beyond it [rad]."""
+        normal = np.array([np.cos(self.direction), np.sin(self.direction)])
+        beyond = np.maximum(bending @ normal - self.limit, 0.0)
+        return np.asarray(bending - beyond[..., None] * normal, dtype=np.float64)
+
+
 class PneumaticPlant:
     """A batch of simulated three-chamber arms with the state of their steppers and their play.
 
@@ -195,6 +217,8 @@ class PneumaticPlant:
         How the backbone bends; None for constant curvature.
     batch : tuple of int
         Leading shape of the batch.
+    wall : Wall or None
+        A rod beside the arm.
 
     Notes
     -----
@@ -207,8 +231,9 @@ class PneumaticPlant:
         chambers: ChamberParameters,
         backbone: BackboneParameters | None = None,
         batch: tuple[int, ...] = (),
+        wall: Wall | None = None,
     ) -> None:
-        self.arm, self.chambers, self.backbone = arm, chambers, backbone
+        self.arm, self.chambers, self.backbone, self.wall = arm, chambers, backbone, wall
         self._home = np.asarray(arm.home, dtype=float)
         self.motors = np.broadcast_to(self._home, (*batch, 3)).copy()
         self._piston = np.zeros((*batch, 3))
@@ -245,6 +270,8 @@ class PneumaticPlant:
     def configuration(self) -> Array:
         """Arcs of the true backbone, ``(..., n, 3)``."""
         arcs = self.arm.configuration(self.lengths)
+        if self.wall is not None:
+            arcs[..., :2] = self.wall.stop(arcs[..., :2])
         if self.backbone is None:
             return arcs
         return self.backbone.shape(arcs[..., 0, :2], arcs[..., 0, 2])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from soro_lib.arcs import chain_transform
 from soro_lib.robots.pneumatic import PneumaticArm
-from soro_lib.robots.pneumatic_plant import BackboneParameters, ChamberParameters, PneumaticPlant
+from soro_lib.robots.pneumatic_plant import BackboneParameters, ChamberParameters, PneumaticPlant, Wall
 
 ARM = PneumaticArm()
 EVEN = BackboneParameters(taper=0.0, threefold=0.0, tip_weight=0.0)
@@ -114,3 +114,13 @@ def test_bad_command_is_refused_and_nothing_moves(command):
 def test_bad_parameters_are_refused(kind, options, message):
     with pytest.raises(ValueError, match=message):
         kind(**options)
+
+
+def test_wall_stops_the_arm_on_its_side_only():
+    wall = Wall(direction=0.0, limit=0.2)
+    assert np.allclose(
+        wall.stop(np.array([[0.5, 0.3], [0.1, 0.3], [-0.5, 0.0]])), [[0.2, 0.3], [0.1, 0.3], [-0.5, 0]]
+    )
+    plant = PneumaticPlant(ARM, ChamberParameters(), wall=wall)
+    plant.drive(ARM.chamber_lengths([[0.6, 0.0, 0.09]]))
+    assert plant.configuration[0, 0] == pytest.approx(0.2)

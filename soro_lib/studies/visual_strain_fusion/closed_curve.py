@@ -17,7 +17,7 @@ from soro_lib.controllers.hybrid import HybridController, HybridSettings
 from soro_lib.estimators.extreme_learning_machine import ExtremeLearningMachine
 from soro_lib.estimators.visual_strain import VisualStrainEstimator, VisualStrainSettings
 from soro_lib.robots.pneumatic import PneumaticArm
-from soro_lib.robots.pneumatic_plant import BackboneParameters, ChamberParameters, PneumaticPlant
+from soro_lib.robots.pneumatic_plant import BackboneParameters, ChamberParameters, PneumaticPlant, Wall
 from soro_lib.studies.visual_strain_fusion.motion import PERIOD, glue_fibre, tip_pose
 from soro_lib.studies.visual_strain_fusion.tracking import load_plant
 
@@ -123,6 +123,7 @@ def follow_curve(
     fitted_map: bool,
     gain: float = 0.1,
     camera: CameraModel | None = None,
+    wall: Wall | None = None,
     cycles: int = 3,
 ) -> CurveRun:
     """Follow the curve with the fused pose as feedback: model-based, then hybrid, then with an obstacle.
@@ -137,12 +138,14 @@ def follow_curve(
         Proportional gain K_p [-].
     camera : CameraModel, optional
         Errors of the camera.
+    wall : Wall, optional
+        A rod beside the arm.
     cycles : int
         1 to 3 cycles.
     """
     camera = camera or CameraModel()
     arm, chambers = PneumaticArm(), load_plant("pentagram").chambers
-    plant = PneumaticPlant(arm, chambers, BackboneParameters())
+    plant = PneumaticPlant(arm, chambers, BackboneParameters(), wall=wall)
     mapping = fit_actuation_map(chambers) if fitted_map else None
     controller = HybridController(arm, HybridSettings(proportional_gain=gain))
     estimator = VisualStrainEstimator(ExtremeLearningMachine(rng), VisualStrainSettings())
