@@ -18,7 +18,10 @@ from soro_lib.controllers.hand_gate import GatedHand, GateSettings, HandGate
 from soro_lib.controllers.hand_mapping import PalmMapping, TipGoal, Vector
 from soro_lib.controllers.obstacles import Sphere, clearances
 from soro_lib.controllers.steering_step import (
+    CABLE_UNITS,
+    MILLIMETRE,
     Step,
+    StepBounds,
     StepWeights,
     avoiding_step,
     locked_step,
@@ -59,7 +62,7 @@ class SteeringSettings:
     cable_rate : float
         Largest change of a cable tension [N/s].
     slide_speed : float
-        Largest speed of the slide [m/s].
+        Largest speed of the slide [m/s]. Another arm's actuators cross their range in two seconds.
     minimum_tension : float
         Pretension that keeps cables from going slack [N]; the paper allows 0 (erratum GS-18).
     iterations : int
@@ -163,7 +166,7 @@ class GestureSteering:
     Parameters
     ----------
     robot : Robot
-        The arm; ``CableDrivenArm`` runs compiled.
+        The arm; ``CableDrivenArm`` runs compiled. Another arm's actuators all count in thousandths of SI units.
     settings : SteeringSettings, optional
         All choices.
     actuation : array_like (n,), optional
@@ -185,9 +188,13 @@ class GestureSteering:
             compiled_kinematics(robot) if isinstance(robot, CableDrivenArm) else generic_kinematics(robot)
         )
         self._lower, self._upper = robot.lower.copy(), robot.upper.copy()
-        self._upper[1:] = np.minimum(self._upper[1:], -self.settings.minimum_tension)
-        self._rates = np.full(len(self._lower), self.settings.cable_rate)
-        self._rates[0] = self.settings.slide_speed
+        if isinstance(robot, CableDrivenArm):
+            self._units = CABLE_UNITS
+            self._rates = np.array([self.settings.slide_speed] + [self.settings.cable_rate] * 6)
+            self._upper[1:] = -self.settings.minimum_tension
+        else:
+            self._units = np.full(len(self._lower), MILLIMETRE)
+            self._rates = (self._upper - self._lower) / 2.0
         self.reset(robot.home if actuation is None else actuation)
 
     def reset(self, actuation: ArrayLike) -> None:
@@ -288,18 +295,15 @@ class GestureSteering:
         upper = np.minimum(self._upper - self.actuation, reach)
         position_step = _shortened(self._target - pose.tip, settings.tip_speed * interval)
         direction_step = _shortened(self._direction.direction - pose.direction, settings.turn_rate * interval)
+        bounds = StepBounds(lower, upper, self._units)
         if mode is Mode.FIST:
             mid_step = self._locked_mid - pose.mid
-            problem = locked_step(
-                pose, position_step, mid_step, direction_step, lower, upper, settings.weights
-            )
+            problem = locked_step(pose, position_step, mid_step, direction_step, bounds, settings.weights)
         elif settings.obstacles:
             near = clearances(self.robot, self.actuation, settings.obstacles)
-            problem = avoiding_step(
-                pose, position_step, near, lower, upper, settings.weights, settings.margin
-            )
+            problem = avoiding_step(pose, position_step, near, bounds, settings.weights, settings.margin)
         else:
-            problem = pose_step(pose, position_step, direction_step, lower, upper, settings.weights)
+            problem = pose_step(pose, position_step, direction_step, bounds, settings.weights)
         return solve(problem)
 
     def _take(self, actuation_step: Array, interval: float) -> None:

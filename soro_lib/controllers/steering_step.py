@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import daqp
 import numpy as np
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MILLIMETRE = 1e-3
-_NO_ROWS = np.zeros((0, 7))
+CABLE_UNITS = np.array([MILLIMETRE] + [1.0] * 6)
+"""SI value of one unit of each actuator of the cable-driven arm: a millimetre of the slide, a newton of each cable."""
 
 
 @dataclass(frozen=True)
@@ -70,21 +72,40 @@ class StepWeights:
             )
 
 
-@dataclass(frozen=True, eq=False)
-class StepProblem:
-    """Minimise |rows step - right|^2 + |weights * step|^2 within bounds; millimetres and newtons.
+class StepBounds(NamedTuple):
+    """How far the actuation may go in one step.
 
     Attributes
     ----------
-    rows : ndarray (m, 7)
+    lower, upper : ndarray (n,)
+        Bounds of the step [m, then N].
+    units : ndarray (n,)
+        SI value of one unit of each actuator inside the solver; a millimetre takes the slide's damping, anything
+        else lambda.
+    """
+
+    lower: Array
+    upper: Array
+    units: Array = CABLE_UNITS
+
+
+@dataclass(frozen=True, eq=False)
+class StepProblem:
+    """Minimise ``|rows step - right|^2 + |damping * step|^2`` within bounds; millimetres and newtons.
+
+    Attributes
+    ----------
+    rows : ndarray (m, n)
         Linearised residuals.
     right : ndarray (m,)
         What they shall become.
-    damping : ndarray (7,)
+    damping : ndarray (n,)
         Weight of each actuator's own motion.
-    lower, upper : ndarray (7,)
+    lower, upper : ndarray (n,)
         Bounds of the step.
-    matrix, bound : ndarray (k, 7), (k,)
+    units : ndarray (n,)
+        SI value of one unit of each actuator.
+    matrix, bound : ndarray (k, n), (k,)
         Inequalities ``matrix @ step <= bound``.
     """
 
@@ -93,8 +114,9 @@ class StepProblem:
     damping: Array
     lower: Array
     upper: Array
-    matrix: Array = field(default_factory=lambda: _NO_ROWS)
-    bound: Array = field(default_factory=lambda: np.zeros(0))
+    units: Array
+    matrix: Array
+    bound: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,8 +160,9 @@ def resolved_rate(jacobian: Array, velocity: ArrayLike, null_space_velocity: Arr
 # --- the three objectives ----------------------------------------------------------------------------------
 
 
-def pose_step(kinematics: Kinematics, position_step: Array, direction_step: Array, lower: Array, upper: Array,
-              weights: StepWeights) -> StepProblem:  # fmt: skip
+def pose_step(
+    kinematics: Kinematics, position_step: Array, direction_step: Array, bounds: StepBounds, weights: StepWeights
+) -> StepProblem:
     """Follow position and direction; Lai et al., Eq. (26).
 
     The paper's Euler angles over-constrain a pointing direction (erratum GS-16); here the direction itself
@@ -153,31 +176,33 @@ def pose_step(kinematics: Kinematics, position_step: Array, direction_step: Arra
         Wanted change of the tip position [m].
     direction_step : ndarray (3,)
         Wanted change of the pointing direction [rad].
-    lower, upper : ndarray (7,)
-        Bounds of the step of the actuation [m, then N].
+    bounds : StepBounds
+        Of the step of the actuation.
     weights : StepWeights
         See there.
     """
-    return _problem(
-        ((kinematics.tip_jacobian, position_step, 1 / MILLIMETRE),
-         (kinematics.direction_jacobian, direction_step, weights.direction)),
-        lower, upper, weights,
-    )  # fmt: skip
+    position = (kinematics.tip_jacobian, position_step, 1 / MILLIMETRE)
+    direction = (kinematics.direction_jacobian, direction_step, weights.direction)
+    return _problem((position, direction), bounds, weights)
 
 
-def locked_step(kinematics: Kinematics, position_step: Array, mid_step: Array, direction_step: Array, lower: Array,
-                upper: Array, weights: StepWeights) -> StepProblem:  # fmt: skip
+def locked_step(
+    kinematics: Kinematics,
+    position_step: Array,
+    mid_step: Array,
+    direction_step: Array,
+    bounds: StepBounds,
+    weights: StepWeights,
+) -> StepProblem:
     """Follow the position with the mid point held; Lai et al., Eq. (27).
 
     Parameters are those of :func:`pose_step`, and ``mid_step``: wanted change of the mid point (3,) [m].
     """
-    blocks = [
-        (kinematics.tip_jacobian, position_step, 1 / MILLIMETRE),
-        (kinematics.mid_jacobian, mid_step, weights.mid_point / MILLIMETRE),
-    ]
-    if weights.locked_direction > 0:
-        blocks.append((kinematics.direction_jacobian, direction_step, weights.locked_direction))
-    return _problem(blocks, lower, upper, weights)
+    position = (kinematics.tip_jacobian, position_step, 1 / MILLIMETRE)
+    mid_position = (kinematics.mid_jacobian, mid_step, weights.mid_point / MILLIMETRE)
+    direction = (kinematics.direction_jacobian, direction_step, weights.locked_direction)
+    blocks = (position, mid_position, direction) if weights.locked_direction > 0 else (position, mid_position)
+    return _problem(blocks, bounds, weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +213,7 @@ class Clearance:
     ----------
     distance : float
         From the axis of the arm to the centre of the obstacle [m].
-    gradient : ndarray (7,)
+    gradient : ndarray (n,)
         Its derivative by the actuation.
     contact : float
         Distance at which arm and obstacle touch: R_obs + R_sr [m].
@@ -199,13 +224,19 @@ class Clearance:
     contact: float
 
 
-def avoiding_step(kinematics: Kinematics, position_step: Array, clearances: Sequence[Clearance], lower: Array,
-                  upper: Array, weights: StepWeights, margin: float | None = None) -> StepProblem:  # fmt: skip
+def avoiding_step(
+    kinematics: Kinematics,
+    position_step: Array,
+    clearances: Sequence[Clearance],
+    bounds: StepBounds,
+    weights: StepWeights,
+    margin: float | None = None,
+) -> StepProblem:
     """Follow the position and keep away from obstacles; Lai et al., Eq. (29), linearised.
 
     Parameters
     ----------
-    kinematics, position_step, lower, upper, weights
+    kinematics, position_step, bounds, weights
         As in :func:`pose_step`.
     clearances : sequence of Clearance
         The nearest point comes first; it alone enters the cost of (29).
@@ -218,11 +249,12 @@ def avoiding_step(kinematics: Kinematics, position_step: Array, clearances: Sequ
         ratio = nearest.contact / nearest.distance
         slope = -ratio / nearest.distance * nearest.gradient
         blocks.append((slope[None], np.array([-ratio]), math.sqrt(weights.avoidance)))
-    matrix, bound = _NO_ROWS, np.zeros(0)
-    if margin is not None and clearances:
-        matrix = np.array([-item.gradient for item in clearances]) * _column_scale(7) / MILLIMETRE
-        bound = np.array([item.distance - item.contact - margin for item in clearances]) / MILLIMETRE
-    return _problem(blocks, lower, upper, weights, matrix, bound)
+    problem = _problem(blocks, bounds, weights)
+    if margin is None or not clearances:
+        return problem
+    approach = np.array([-item.gradient for item in clearances]) * bounds.units / MILLIMETRE
+    room = np.array([item.distance - item.contact - margin for item in clearances]) / MILLIMETRE
+    return replace(problem, matrix=approach, bound=room)
 
 
 def step_bound_as_printed(actuators: int = 7) -> tuple[Array, Array]:
@@ -232,6 +264,25 @@ def step_bound_as_printed(actuators: int = 7) -> tuple[Array, Array]:
     It bounds a step from above only, so it lets cables pull freely and release slowly.
     """
     return np.diag([1e-3] + [1.0] * (actuators - 1)), np.full(actuators, 1e-2)
+
+
+def _problem(
+    blocks: Sequence[tuple[Array, Array, float]], bounds: StepBounds, weights: StepWeights
+) -> StepProblem:
+    """Stack weighted blocks (Jacobian, wanted change, weight) and change to the units of the solver."""
+    lower, upper, units = bounds
+    rows = np.concatenate([jacobian * weight for jacobian, _, weight in blocks]) * units
+    right = np.concatenate([wanted * weight for _, wanted, weight in blocks])
+    damping = np.where(units == MILLIMETRE, weights.slide_damping, weights.damping)
+    return StepProblem(rows, right, damping, lower / units, upper / units, units, _no_rows(len(units)), _NOTHING)
+
+
+_NOTHING = np.zeros(0)
+
+
+@cache
+def _no_rows(actuators: int) -> Array:
+    return np.zeros((0, actuators))
 
 
 # --- solving -----------------------------------------------------------------------------------------------
@@ -248,20 +299,18 @@ def solve(problem: StepProblem) -> Step:
     hessian = problem.rows.T @ problem.rows
     hessian.ravel()[:: len(hessian) + 1] += np.square(problem.damping)
     gradient = -(problem.right @ problem.rows)
+    upper, lower = problem.upper, problem.lower
     if len(problem.bound):
-        upper = np.concatenate([problem.upper, problem.bound])
-        lower = np.concatenate([problem.lower, np.full(len(problem.bound), -1e30)])
-    else:
-        upper, lower = problem.upper, problem.lower
-    if not (np.isfinite(gradient).all() and np.isfinite(hessian).all()):
+        upper = np.concatenate([upper, problem.bound])
+        lower = np.concatenate([lower, np.full(len(problem.bound), -1e30)])
+    if not math.isfinite(gradient.sum() + hessian.sum()):
         return Step(np.zeros(len(gradient)), False, "the problem is not finite")
-    step, _, flag, _ = daqp.solve(
-        hessian, gradient, problem.matrix, upper, lower, np.zeros(len(upper), np.intc)
-    )
+    sense = np.zeros(len(upper), dtype=np.intc)
+    step, _, flag, _ = daqp.solve(hessian, gradient, problem.matrix, upper, lower, sense)
     if flag < 1:
         reason = "the bounds contradict each other" if flag == -1 else f"daqp stopped with flag {flag}"
         return Step(np.zeros(len(gradient)), False, reason)
-    return Step(step * _column_scale(len(step)), True)
+    return Step(step * problem.units, True)
 
 
 class ReadableStep:
@@ -299,40 +348,24 @@ class ReadableStep:
             cp.Minimize(objective), [self.lower <= self.dq, self.dq <= self.upper]
         )
 
-    def solve(self, kinematics: Kinematics, position_step: ArrayLike, direction_step: ArrayLike, mid_step: ArrayLike,
-              lower: ArrayLike, upper: ArrayLike, **options: Any) -> Step:  # fmt: skip
+    def solve(
+        self,
+        kinematics: Kinematics,
+        position_step: ArrayLike,
+        direction_step: ArrayLike,
+        mid_step: ArrayLike,
+        bounds: StepBounds,
+        **options: Any,
+    ) -> Step:
         """Solve one step; arguments as in :func:`pose_step` and :func:`locked_step`, options go to cvxpy."""
-        scale = _column_scale(7)
-        self.J.value = kinematics.tip_jacobian * scale / MILLIMETRE
-        self.J_M.value = kinematics.mid_jacobian * scale / MILLIMETRE
-        self.J_n.value = kinematics.direction_jacobian * scale
+        lower, upper, units = bounds
+        self.J.value = kinematics.tip_jacobian * units / MILLIMETRE
+        self.J_M.value = kinematics.mid_jacobian * units / MILLIMETRE
+        self.J_n.value = kinematics.direction_jacobian * units
         self.dx.value, self.dx_M.value = np.divide(position_step, MILLIMETRE), np.divide(mid_step, MILLIMETRE)
         self.dn.value = np.asarray(direction_step, dtype=float)
-        self.lower.value, self.upper.value = np.asarray(lower) / scale, np.asarray(upper) / scale
+        self.lower.value, self.upper.value = lower / units, upper / units
         self.problem.solve(**{"solver": "CLARABEL", **options})
         if self.problem.status != "optimal" or self.dq.value is None:
             return Step(np.zeros(7), False, f"cvxpy: {self.problem.status}")
-        return Step(self.dq.value * scale, True)
-
-
-def _problem(blocks: Sequence[tuple[Array, Array, float]], lower: Array, upper: Array, weights: StepWeights,
-             matrix: Array = _NO_ROWS, bound: Array | None = None) -> StepProblem:  # fmt: skip
-    """Stack weighted blocks (Jacobian, wanted change, weight) and change to millimetres and newtons."""
-    scale = _column_scale(len(lower))
-    rows = np.concatenate([jacobian * weight for jacobian, _, weight in blocks]) * scale
-    right = np.concatenate([wanted * weight for _, wanted, weight in blocks])
-    damping = np.full(len(lower), weights.damping)
-    damping[0] = weights.slide_damping
-    return StepProblem(
-        rows, right, damping, lower / scale, upper / scale, matrix, np.zeros(0) if bound is None else bound
-    )
-
-
-_SCALES: dict[int, Array] = {}
-
-
-def _column_scale(actuators: int) -> Array:
-    """Return the SI value of one unit of each actuator: a millimetre of the slide, a newton of each cable."""
-    if actuators not in _SCALES:
-        _SCALES[actuators] = np.array([MILLIMETRE] + [1.0] * (actuators - 1))
-    return _SCALES[actuators]
+        return Step(self.dq.value * units, True)

@@ -9,7 +9,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from soro_lib.controllers.gesture_steering import SteeringSettings
 from soro_lib.controllers.hand_mapping import PalmMapping
-from soro_lib.controllers.steering_step import StepWeights, pose_step, solve
+from soro_lib.controllers.steering_step import StepBounds, StepWeights, pose_step, solve
 from soro_lib.robots import CableDrivenArm
 from soro_lib.robots.cable_driven_kernels import compiled_kinematics
 from soro_lib.sensing.synthetic_hand import QUIET
@@ -47,7 +47,7 @@ def reached(
                 wanted = np.clip(position - pose.tip, -0.02, 0.02)
                 lower = np.maximum(arm.lower - actuation, -np.array([0.02, *[0.5] * 6]))
                 upper = np.minimum(arm.upper - actuation, np.array([0.02, *[0.5] * 6]))
-                step = solve(pose_step(pose, wanted, direction - pose.direction, lower, upper, weights))
+                step = solve(pose_step(pose, wanted, direction - pose.direction, StepBounds(lower, upper), weights))
                 actuation = np.clip(actuation + step.actuation_step, arm.lower, arm.upper)
                 if np.abs(step.actuation_step).max() < 1e-5:
                     break
