@@ -253,7 +253,8 @@ def _stoppable() -> Iterator[None]:
         raise Stopped(signal_number)
 
     before = {}
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    hang_up = [] if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else [signal.SIGHUP]  # nohup
+    for number in (signal.SIGINT, signal.SIGTERM, *hang_up):
         with suppress(ValueError):  # outside the main thread there is nothing to catch
             before[number] = signal.signal(number, stop)
     try:
