@@ -1,0 +1,369 @@
+"""The cameras of the handover, closed: true state in, rendered images, detection, observation out.
+
+:class:`HandoverVision` is what would run beside the real arm: images in, observation out.
+:class:`RenderedObserver` puts a simulated room before it and is an
+:class:`soro_lib.sensing.handover_observation.Observer`. Frame `arm_base`, z down.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soro_lib.sensing.handover_observation import HandoverObservation
+from soro_lib.sensing.handover_scene import (
+    STEREO,
+    WEBCAM,
+    Extras,
+    HandoverScene,
+    MarkerRing,
+    Viewpoint,
+    photograph,
+)
+from soro_lib.sensing.marker_pose import (
+    WristPose,
+    average_pose,
+    consensus_pose,
+    joint_pose,
+    viewing_cosines,
+    wrist_candidates,
+)
+from soro_lib.sensing.rendering import Image, Photometry
+from soro_lib.sensing.stereo_vision import (
+    BallDetector,
+    BallSight,
+    CalibratedCamera,
+    MarkerDetector,
+    Window,
+    around,
+    box_corners,
+    calibrate,
+    ray_gap,
+    triangulate,
+)
+
+ESTIMATORS = ("thesis", "gated", "joint")
+
+
+@dataclass
+class Look:
+    """What was made of one set of images.
+
+    Attributes
+    ----------
+    observation : HandoverObservation
+    markers : list of dict
+        Corners of the markers each camera sees, by id.
+    balls : list of list of BallSight
+        Green circles each camera sees.
+    chosen : list of BallSight or None
+        The circle of each camera that was taken for the ball.
+    complaints : list of str
+        Per camera "", or why its image was not used.
+    """
+
+    observation: HandoverObservation
+    markers: list[dict[int, NDArray[np.float64]]]
+    balls: list[list[BallSight]]
+    chosen: list[BallSight | None]
+    complaints: list[str]
+
+
+@dataclass
+class HandoverVision:
+    """Finds arm and ball in the images of two or more calibrated cameras.
+
+    A camera whose image is missing, of another size or type, or exactly the one before (a sensor never takes
+    the same picture twice) is left out: the arm is then known from the others, the ball only while two are
+    left. If two cameras with at least two markers each put the wrist more than `largest_disagreement` apart,
+    nothing is believed: cables or calibrations are swapped, or a camera was moved.
+
+    Parameters
+    ----------
+    cameras : sequence of CalibratedCamera
+    estimator : str
+        "thesis", "gated" or "joint": :func:`average_pose`, :func:`consensus_pose`, :func:`joint_pose`. The
+        thesis takes the largest green piece of each image for the ball; the others take together the pieces
+        of a hidden ball and choose the circles whose rays meet.
+    ring : MarkerRing
+    gripper_length, ball_radius : float
+        Known sizes [m].
+    track : bool
+        Whether markers and ball are looked for around their last place first.
+    largest_disagreement : float
+        See above [m].
+    largest_gap : float
+        Farthest that the rays to one ball may pass from each other [m].
+
+    Raises
+    ------
+    ValueError
+        If the estimator is unknown or there are fewer than two cameras.
+    """
+
+    cameras: Sequence[CalibratedCamera]
+    estimator: str = "thesis"
+    ring: MarkerRing = field(default_factory=MarkerRing)
+    gripper_length: float = 0.10
+    ball_radius: float = 0.020
+    track: bool = True
+    largest_disagreement: float = 0.10
+    largest_gap: float = 0.010
+
+    def __post_init__(self) -> None:
+        if self.estimator not in ESTIMATORS:
+            raise ValueError(f"estimator must be one of {', '.join(ESTIMATORS)}, got {self.estimator!r}")
+        if len(self.cameras) < 2:
+            raise ValueError(f"two cameras are needed at least, got {len(self.cameras)}")
+        self.marker_detector = MarkerDetector(self.ring)
+        self.ball_detector = BallDetector(join_pieces=self.estimator != "thesis")
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget earlier images."""
+        count = len(self.cameras)
+        self._last_pictures: list[bytes | None] = [None] * count
+        self._marker_windows: list[Window | None] = [None] * count
+        self._ball_windows: list[Window | None] = [None] * count
+        self._last_points: NDArray[np.float64] | None = None
+        self._last_ball: NDArray[np.float64] | None = None
+
+    def look(self, images: Sequence[Image | None]) -> Look:
+        """Return what the images (one per camera, blue, green, red) show.
+
+        Raises
+        ------
+        ValueError
+            If there are not as many images as cameras.
+        """
+        if len(images) != len(self.cameras):
+            raise ValueError(f"{len(self.cameras)} cameras need as many images, got {len(images)}")
+        complaints = [self._complaint(i, image) for i, image in enumerate(images)]
+        usable = [image if not complaint else None for image, complaint in zip(images, complaints)]
+        markers = [{} if image is None else self._markers(i, image) for i, image in enumerate(usable)]
+        balls = [[] if image is None else self._balls(i, image) for i, image in enumerate(usable)]
+        pose = self.estimate(markers, self.estimator)
+        ball, gap, chosen = self._ball(balls)
+        trouble = "" if pose else "no marker seen"
+        apart = self._wrists_apart(markers)
+        if apart > self.largest_disagreement:
+            pose = ball = None
+            trouble = f"the cameras put the wrist {1e3 * apart:.0f} mm apart: swapped or moved?"
+        if pose is not None:
+            gripper = pose.wrist + self.gripper_length * pose.direction
+            self._last_points = np.concatenate([pose.wrist, gripper])
+        status = "; ".join(text for text in (trouble, *complaints) if text)
+        observation = HandoverObservation(
+            wrist=None if pose is None else pose.wrist,
+            direction=None if pose is None else pose.direction,
+            ball=ball,
+            disagreement=gap,
+            status=status,
+        )
+        if pose is not None:
+            observation = replace(
+                observation,
+                wrist_deviation=pose.wrist_deviation,
+                direction_deviation=pose.direction_deviation,
+            )
+        if ball is not None:
+            clear = min(sight.fill for sight in chosen if sight is not None) > CLEAR_FILL
+            observation = replace(observation, ball_deviation=0.001 if clear else 0.010)
+        return Look(observation, markers, balls, chosen, complaints)
+
+    def estimate(self, markers: Sequence[dict[int, NDArray[np.float64]]], estimator: str) -> WristPose | None:
+        """Return the wrist that an estimator makes of the markers of each camera; None without markers."""
+        sights = [(camera, seen) for camera, seen in zip(self.cameras, markers) if seen]
+        if not sights:
+            return None
+        candidates = [wrist_candidates(seen, camera, self.ring) for camera, seen in sights]
+        together = np.concatenate(candidates)
+        if estimator == "thesis":
+            return average_pose(together)
+        cosines = [
+            viewing_cosines(c, seen, camera, self.ring) for c, (camera, seen) in zip(candidates, sights)
+        ]
+        agreed = consensus_pose(together, np.concatenate(cosines), self.gripper_length, self._last_points)
+        if estimator == "gated" or agreed.pose is None:
+            return agreed
+        return joint_pose(agreed.pose, sights, self.ring)
+
+    def _complaint(self, index: int, image: Image | None) -> str:
+        """Return why an image cannot be used, or ""."""
+        camera = self.cameras[index].camera
+        last, self._last_pictures[index] = self._last_pictures[index], None
+        if image is None or np.size(image) == 0:
+            return f"camera {index + 1}: no image"
+        if image.shape != (camera.height, camera.width, 3) or image.dtype != np.uint8:
+            return (
+                f"camera {index + 1}: image is {image.dtype} {image.shape}, "
+                f"not uint8 ({camera.height}, {camera.width}, 3)"
+            )
+        picture = image[::16, ::16].tobytes()
+        self._last_pictures[index] = picture
+        return f"camera {index + 1}: frozen" if picture == last else ""
+
+    def _markers(self, index: int, image: Image) -> dict[int, NDArray[np.float64]]:
+        """Return the markers in an image, looked for around their last place, then everywhere."""
+        window = self._marker_windows[index]
+        seen = self.marker_detector.detect(image, window) if window else {}
+        seen = seen or self.marker_detector.detect(image)
+        self._marker_windows[index] = None
+        if seen and self.track:
+            corners = np.concatenate(list(seen.values()))
+            middle = tuple(corners.mean(axis=0).tolist())
+            self._marker_windows[index] = around(middle, np.ptp(corners, axis=0).max() / 2 + 80, image.shape)
+        return seen
+
+    def _balls(self, index: int, image: Image) -> list[BallSight]:
+        """Return the green circles in an image, looked for around the ball's last place, then everywhere."""
+        window = self._ball_windows[index]
+        found = self.ball_detector.detect(image, window) if window else []
+        return found or self.ball_detector.detect(image)
+
+    def _wrists_apart(self, markers: Sequence[dict[int, NDArray[np.float64]]]) -> float:
+        """Return how far apart the cameras put the wrist [m], of those that see two markers at least."""
+        wrists = []
+        for i, seen in enumerate(markers):
+            alone = self.estimate([seen if j == i else {} for j in range(len(markers))], "gated")
+            if alone is not None and len(seen) >= 2:
+                wrists.append(alone.wrist)
+        return max((float(np.linalg.norm(a - b)) for a in wrists for b in wrists), default=0.0)
+
+    def _ball(
+        self, balls: Sequence[list[BallSight]]
+    ) -> tuple[NDArray[np.float64] | None, float, list[BallSight | None]]:
+        """Return the ball's place (3,), the gap of its rays [m] and the circle taken from each camera."""
+        seeing = [i for i, found in enumerate(balls) if found]
+        chosen: list[BallSight | None] = [None] * len(balls)
+        best: tuple[float, NDArray[np.float64], float, tuple[BallSight, ...]] | None = None
+        few = 1 if self.estimator == "thesis" else 3
+        for sights in product(*(balls[i][:few] for i in seeing)) if len(seeing) >= 2 else ():
+            place, gap = self._meet(seeing, sights)
+            if self.estimator != "thesis" and not (
+                gap < self.largest_gap and self._right_size(seeing, sights, place)
+            ):
+                continue
+            if self._last_ball is not None:
+                cost = float(np.linalg.norm(place - self._last_ball))
+            else:
+                cost = -sum(sight.fill * sight.radius**2 for sight in sights)
+            if best is None or cost < best[0]:
+                best = cost, place, gap, sights
+        if best is None:
+            self._ball_windows = [None] * len(balls)
+            return None, 0.0, chosen
+        _, place, gap, taken = best
+        self._last_ball = place if self.track else None
+        for i, sight in zip(seeing, taken):
+            chosen[i] = sight
+            camera = self.cameras[i].camera
+            reach = 2 * sight.radius + 60
+            shape = camera.height, camera.width
+            self._ball_windows[i] = around(sight.centre, reach, shape) if self.track else None
+        return place, gap, chosen
+
+    def _meet(self, seeing: list[int], sights: tuple[BallSight, ...]) -> tuple[NDArray[np.float64], float]:
+        rays = [self.cameras[i].rays([sight.centre]) for i, sight in zip(seeing, sights)]
+        origins = np.array([origin for origin, _ in rays])
+        directions = np.array([direction[0] for _, direction in rays])
+        return triangulate(origins, directions), ray_gap(origins, directions)
+
+    def _right_size(
+        self, seeing: list[int], sights: tuple[BallSight, ...], place: NDArray[np.float64]
+    ) -> bool:
+        """Return whether no circle is larger than the ball could be there, or far too small."""
+        for i, sight in zip(seeing, sights):
+            camera = self.cameras[i]
+            expected = (
+                camera.camera.focal_length * self.ball_radius / np.linalg.norm(place - camera.pose[:3, 3])
+            )
+            if not 0.4 * expected <= sight.radius <= 1.3 * expected:
+                return False
+        return True
+
+
+CLEAR_FILL = 0.85
+"""Green share of its circle above which a ball counts as unhidden."""
+
+
+def calibrate_on_box(
+    views: Sequence[Viewpoint], rng: np.random.Generator, selection_deviation: float = 0.5
+) -> list[CalibratedCamera]:
+    """Return the cameras as a calibration on the box finds them, its corners selected by hand.
+
+    Parameters
+    ----------
+    views : sequence of Viewpoint
+        The true cameras.
+    rng : numpy.random.Generator
+    selection_deviation : float
+        Standard deviation of a selected corner per axis [px].
+    """
+    corners = box_corners()
+    cameras = []
+    for view in views:
+        truth = CalibratedCamera(view.camera, view.pose).project(corners)
+        selected = truth + selection_deviation * rng.standard_normal(truth.shape)
+        cameras.append(calibrate(view.camera, corners, selected))
+    return cameras
+
+
+Spoil = Callable[[int, list[Image]], Sequence[Image | None]]
+"""What a fault makes of the images, given the number of the look."""
+
+
+@dataclass
+class RenderedObserver:
+    """Sees the truth through rendered images.
+
+    Parameters
+    ----------
+    vision : HandoverVision
+        Whose cameras are where they are believed to be, up to calibration.
+    views : sequence of Viewpoint
+        Where the cameras truly are.
+    scene : HandoverScene
+    photometry : Photometry
+    extras : Extras
+        What else is in the pictures.
+    spoil : callable, optional
+        A fault of the cameras.
+
+    Attributes
+    ----------
+    images : list of images
+        The last pictures.
+    look : Look or None
+        What was made of them.
+    """
+
+    vision: HandoverVision
+    views: Sequence[Viewpoint] = STEREO
+    scene: HandoverScene = field(default_factory=HandoverScene)
+    photometry: Photometry = WEBCAM
+    extras: Extras = field(default_factory=Extras)
+    spoil: Spoil | None = None
+
+    def __post_init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget earlier looks."""
+        self.vision.reset()
+        self.images: list[Image] = []
+        self.look: Look | None = None
+        self._number = -1
+
+    def observe(
+        self, state: NDArray[np.float64], ball: NDArray[np.float64], rng: np.random.Generator
+    ) -> HandoverObservation:
+        """Return what is seen of the true state q (9,) and the true ball (3,) [m]."""
+        self._number += 1
+        items = self.scene.items(state, ball, self.extras)
+        self.images = [photograph(items, view, self.photometry, rng) for view in self.views]
+        shown = self.images if self.spoil is None else self.spoil(self._number, self.images)
+        self.look = self.vision.look(shown)
+        return self.look.observation
