@@ -87,7 +87,7 @@ def test_low_level_controllers():
 
 
 @given(below, below)
-def test_control_error_leads_to_the_proxy_and_evert_the_rest(actual, desired):
+def test_control_error_leads_to_the_proxy_and_everts_the_rest(actual, desired):
     steering, growth = control_error(actual, desired)
     length = np.linalg.norm(actual)
     proxy = np.array(desired) * length / np.linalg.norm(desired)

@@ -35,7 +35,7 @@ def _boxes(trials: pd.DataFrame, metric: str, label: str) -> Figure:
         box_groups(axes, samples, tuple(PARADIGM_COLORS.values()))
         axes.plot(
             range(1, 7),
-            [np.mean(values) for values in samples.values()],
+            [float(np.mean(np.asarray(values))) for values in samples.values()],
             "D",
             markersize=3.5,
             color=COLORS["black"],

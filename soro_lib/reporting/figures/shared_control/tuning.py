@@ -107,8 +107,9 @@ def blend_surface(trials: pd.DataFrame) -> Figure:
         for axes, (metric, label) in zip(row, metrics.items(), strict=True):
             surface = group.pivot_table(index="steering", columns="eversion", values=metric, aggfunc="median")
             image = axes.imshow(np.log10(surface), origin="lower", cmap="viridis_r", aspect="auto")
+            steering, eversion = surface.index.tolist(), surface.columns.tolist()
             for (y, x), value in np.ndenumerate(surface.to_numpy()):
-                name = corners.get((float(surface.index[y]), float(surface.columns[x])), "")
+                name = corners.get((steering[y], eversion[x]), "")
                 pale = np.log10(value) > np.mean(image.get_clim())
                 axes.text(
                     x,
