@@ -162,6 +162,8 @@ def counter_readings(table: pd.DataFrame) -> Figure:
             axes.plot(people["text"], people["caption"], **{**MEASUREMENT, "color": color}, label=str(kind))
         top = float(force.to_numpy().max())
         axes.plot([0, top], [0, top], color=COLORS["grey"], linewidth=0.8, linestyle=":")
-        label_axes(axes, "H, counter of the text [N]", "H, counter of the caption [N]", str(environment))
+        label_axes(
+            axes, "H, counter of the text [N]", "H, counter of the caption [N]", title=str(environment)
+        )
     legend(figure)
     return figure

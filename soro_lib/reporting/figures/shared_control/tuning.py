@@ -123,7 +123,9 @@ def blend_surface(trials: pd.DataFrame) -> Figure:
             axes.set_xticks(range(surface.shape[1]), list(surface.columns))
             axes.set_yticks(range(surface.shape[0]), list(surface.index))
             axes.grid(visible=False)
-            label_axes(axes, "machine's share of eversion", "machine's share of steering", f"{kind}: {label}")
+            label_axes(
+                axes, "machine's share of eversion", "machine's share of steering", title=f"{kind}: {label}"
+            )
     return figure
 
 
