@@ -50,6 +50,8 @@ class SafetyRules:
         Farthest that wrist or ball may appear from their last place [m].
     jump_confirmations : int
         Looks in a row at the new place after which a jump is believed.
+    reach_margin : float
+        How far beyond the longest arm a wrist may appear [m].
     largest_disagreement : float
         Distance between the cameras' rays above which a ball is not believed [m].
     hold_limit : int
@@ -67,6 +69,7 @@ class SafetyRules:
     noticeable_move: float = 0.001
     largest_jump: float = 0.15
     jump_confirmations: int = 3
+    reach_margin: float = 0.10
     largest_disagreement: float = 0.02
     hold_limit: int = 20
     patience: int = 60
@@ -221,7 +224,8 @@ class HandoverController:
         self._task_mode = Mode.APPROACH
         self._last_wrist: NDArray[np.float64] | None = None
         self._last_seen: dict[str, NDArray[np.float64]] = {}
-        self._jumps = {"wrist": 0, "ball": 0}
+        self._jumped_to: dict[str, NDArray[np.float64]] = {}
+        self._looks_after_jump = {"wrist": 0, "ball": 0}
         self._repeats = 0
         self._ball_unseen = 0
         self._held = 0
@@ -324,6 +328,8 @@ class HandoverController:
         wrist, direction, ball = (finite(v) for v in (look.wrist, look.direction, look.ball))
         if ball is not None and not look.disagreement <= rules.largest_disagreement:
             ball = None
+        if wrist is not None and np.linalg.norm(wrist) > sum(self.arm.maximum_lengths) + rules.reach_margin:
+            wrist = None
         if wrist is None or self._last_wrist is None or not np.array_equal(wrist, self._last_wrist):
             self._repeats = 0
         elif np.linalg.norm(self._expected_move) > rules.noticeable_move:
@@ -343,14 +349,17 @@ class HandoverController:
 
     def _without_jump(self, name: str, point: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
         """Return the point, or None if it jumped and has not stayed where it jumped to."""
-        last = self._last_seen.get(name)
         if point is None:
             return None
-        if last is not None and np.linalg.norm(point - last) > self.parameters.safety.largest_jump:
-            self._jumps[name] += 1
-            if self._jumps[name] < self.parameters.safety.jump_confirmations:
+        rules = self.parameters.safety
+        last, new = self._last_seen.get(name), self._jumped_to.get(name)
+        if last is not None and np.linalg.norm(point - last) > rules.largest_jump:
+            stayed = new is not None and np.linalg.norm(point - new) <= rules.largest_jump
+            self._looks_after_jump[name] = self._looks_after_jump[name] + 1 if stayed else 1
+            self._jumped_to[name] = point
+            if self._looks_after_jump[name] < rules.jump_confirmations:
                 return None
-        self._jumps[name] = 0
+        self._jumped_to.pop(name, None)
         self._last_seen[name] = point
         return point
 
@@ -376,7 +385,7 @@ class HandoverController:
         """Go home open loop: a straight way within the limits, which are convex in `q_sys`, with an open
         gripper."""
         self._retreat_reason = reason
-        self.gripper_closed = False
+        self.gripper_closed = self._task_mode is Mode.CARRY
         self.q_sys = self.q_sys + self.parameters.safety.retreat_share * (self.arm.home - self.q_sys)
         self.mode = Mode.RETREAT
         if np.abs(self.q_sys - self.arm.home).max() < 0.01:

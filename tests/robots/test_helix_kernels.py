@@ -1,4 +1,4 @@
-"""The compiled kinematics: equal to the batched arm, to the matrix exponential and to numerical derivatives."""
+"""The compiled kinematics: equal to the batched arm, the matrix exponential and numerical derivatives."""
 
 import numpy as np
 import pytest

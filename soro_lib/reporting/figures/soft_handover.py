@@ -307,7 +307,7 @@ def filter_cap(runs: pd.DataFrame, poles: pd.DataFrame) -> Figure:
         panels[1].plot(medians.index, medians["overshoot_mm"], color=color, marker="o", label=filters)
     for color, (filters, group) in zip(SERIES, poles.groupby("filters", sort=False)):
         panels[2].plot(group["step_gain"], group["pole"], color=color, label=filters)
-    panels[0].set_yscale("log")
+    panels[0].set_ylim(bottom=0)
     label_axes(panels[0], "step size [-]", "steps", title="Steps")
     label_axes(panels[1], "step size [-]", "overshoot [mm]", title="Overshoot")
     label_axes(panels[2], "loop gain per step [-]", "slowest pole, modulus [-]", title="Linear loop")

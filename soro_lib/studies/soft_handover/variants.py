@@ -37,9 +37,11 @@ def loop_variants(step_size: float) -> dict[str, HandoverParameters]:
     return {
         "all 20 iterations": printed,
         "early exit": thesis_parameters(step_size, inner_loop="early exit"),
-        "squared norms": replace(
-            thesis_parameters(step_size, tolerance=0.005**0.5, inner_loop="early exit"), pose_bound=0.005**0.5
+        "squared norm in Algorithm 1": thesis_parameters(
+            step_size, tolerance=0.005**0.5, inner_loop="early exit"
         ),
+        "squared norm in Eq. (16)": replace(printed, pose_bound=0.005**0.5),
+        "squared norm in Algorithm 3": replace(printed, stop_threshold=0.05**0.5),
         "pose bound 2 mm": replace(printed, pose_bound=0.002),
         "no filter": replace(printed, filters=NO_FILTER),
         "no error floor": thesis_parameters(step_size, error_reference="measurement"),
