@@ -46,7 +46,7 @@ def _draw_contacts(run: ContactRun, events: tuple[int, int]) -> Figure:
             distance = np.linalg.norm(position[steps] - run.motion.pose[steps, :3], axis=1)
             error.plot(PERIOD * steps, 1e3 * distance, linewidth=1.0, color=STYLES[name]["color"])
         path.plot(*(1e3 * run.motion.pose[steps, :2]).T, **{**TRUTH, "linewidth": 1.0}, label="truth")
-        low, high = error.get_ylim()
+        high = error.get_ylim()[1]
         lost = run.lost[steps]
         error.fill_between(PERIOD * steps, 0, high, where=lost, color=COLORS["light"], linewidth=0, zorder=0)
         error.set_ylim(0, high)

@@ -47,10 +47,18 @@ def elm_before_and_after(table: pd.DataFrame) -> Figure:
     for column, (label, color, marker) in styles.items():
         mean, low, high = (getattr(groups[column], how)() for how in ("mean", "min", "max"))
         spread = np.stack([mean - low, high - mean])
+        blown = mean.to_numpy() > 10.0
+        if blown.any():
+            mean, spread = mean.mask(blown), np.where(blown, np.nan, spread)
         axes.errorbar(mean, rows, xerr=spread, linestyle="none", color=color, marker=marker, label=label)
     axes.set_yticks(rows, labels=list(groups.groups))
     axes.invert_yaxis()
-    axes.set_xscale("log")
+    axes.set_xlim(0.0, 1.1)
+    for row, (_, group) in zip(rows, groups):
+        if group.prior_mean_mm.mean() > 10.0:
+            axes.text(
+                0.02, row, f"blown up: {group.prior_mean_mm.mean():.0e} mm", va="center", color="#b00000"
+            )
     label_axes(axes, "mean spatial error [mm]")
     legend(figure)
     return figure

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from soro_lib.reporting.plotting import COLORS, PAGE_WIDTH, REFERENCE, label_axes, legend, new_figure
 from soro_lib.robots.pneumatic_plant import Wall
@@ -96,8 +96,8 @@ def _draw_zoom(comparison: Comparison, gains: tuple[float, float], seed: int = 0
         )
         hybrid = 1e3 * comparison.compensated["literal"].tip[half:, seed, column]
         panel.plot(*hybrid.T, **HYBRID, label="hybrid, second cycle")
-        panel.set_xlim(corner[0] - 9, corner[0] + 9)
-        panel.set_ylim(corner[1] - 4, corner[1] + 14)
+        panel.set_xlim(corner[0] - 14, corner[0] + 14)
+        panel.set_ylim(corner[1] - 4, corner[1] + 20)
         panel.set_aspect("equal")
         label_axes(panel, "x [mm]", "y [mm]", title=f"Kp = {gain:.2f}")
     legend(figure)
@@ -203,7 +203,15 @@ def _draw_curve(run: CurveRun, cycles: tuple[int, ...]) -> Figure:
     return figure
 
 
-def _shade(panels: list[Any], time: NDArray[np.float64], lost: NDArray[np.bool_]) -> None:
+def _shade(panels: list[Any], time: ArrayLike, lost: ArrayLike) -> None:
     for panel in panels:
         low, high = panel.get_ylim()
-        panel.fill_between(time, low, high, where=lost, color=COLORS["light"], linewidth=0, zorder=0)
+        panel.fill_between(
+            np.asarray(time),
+            low,
+            high,
+            where=np.asarray(lost).tolist(),
+            color=COLORS["light"],
+            linewidth=0,
+            zorder=0,
+        )

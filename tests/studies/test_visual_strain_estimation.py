@@ -1,0 +1,65 @@
+"""Studies of the fibre, its network and contacts; small but real."""
+
+import numpy as np
+import pytest
+
+from soro_lib.studies.visual_strain_fusion import collisions, estimation, motion
+
+
+def test_spiral_reaches_the_published_range_and_slows_nowhere():
+    run = motion.spiral()
+    assert np.linalg.norm(run.pose[:, :3], axis=1).max() == pytest.approx(40.23e-3, rel=0.02)
+    assert (run.elongations >= -1e-12).all()
+    assert np.allclose(np.linalg.norm(run.pose[:, 3:], axis=1), 1.0)
+
+
+def test_network_predicts_better_than_its_labels_and_forgets_nothing_by_default():
+    networks = {name: estimation.NETWORKS[name] for name in ("default", "no forgetting")}
+    table = estimation.compare_networks(1, seeds=1, networks=networks, steps=1500).set_index("network")
+    label_noise = 1e3 * np.linalg.norm(estimation.LABEL_NOISE)
+    assert (table.prior_mean_mm < 0.9 * label_noise).all()
+    assert (table.posterior_label_mm < table.prior_label_mm).all()
+
+
+def test_standing_still_blows_up_only_what_is_unbounded():
+    runs = estimation.hold_still(1, hold_steps=1000)
+    worst = {name: run.prior[-1000:].max() for name, run in runs.items()}
+    assert worst["w = 0.99, bounded"] < 2e-3
+    assert worst["no forgetting"] < 2e-3
+    assert worst["w = 0.99, unbounded"] > 1.0
+
+
+def test_more_initial_samples_predict_better():
+    table = estimation.initial_samples(1, seeds=1, counts=(450, 1800)).set_index("samples")
+    assert table.next_mm[1800] < table.next_mm[450]
+    assert table.frozen_mm[1800] < table.frozen_mm[450]
+
+
+def test_push_is_calibrated_to_fifteen_millimetres():
+    contact = collisions.touches()["push cap"]
+    pushed, event, _ = collisions.simulate_contacts(contact, np.random.default_rng(1))
+    free = motion.spiral()
+    displaced = np.linalg.norm(pushed.pose[:, :3] - free.pose[:, :3], axis=1)
+    peaks = [displaced[event == number].max() for number in range(event.max() + 1)]
+    assert np.mean(peaks) == pytest.approx(15e-3, rel=0.05)
+
+
+def test_only_a_finger_on_the_body_presses_on_gratings():
+    for place, pressed in (("cap", False), ("body", True)):
+        _, _, squeeze = collisions.simulate_contacts(
+            collisions.Contact("push", place), np.random.default_rng(1)
+        )
+        assert (squeeze.max() > 0.0) == pressed
+        assert squeeze.max() <= 1.0
+
+
+def test_masking_helps_in_the_dark_as_much_as_the_sheath():
+    contacts = collisions.protections()
+    table = collisions.sweep_contacts(1, contacts, seeds=1).groupby(["contact", "estimator"]).max_mm.max()
+    assert table["bare, masked", "fibre"] < 0.8 * table["bare", "fibre"]
+
+
+@pytest.mark.parametrize("options", [{"kind": "kiss"}, {"place": "base"}, {"fibre": "steel"}, {"force": 0.0}])
+def test_bad_contact_is_refused(options):
+    with pytest.raises(ValueError, match=next(iter(options))):
+        collisions.Contact(**{"kind": "push", "place": "cap", **options})
