@@ -25,7 +25,7 @@ NOT_PRESSING = -1.0
 DECIDED_NOTHING = Decision(False, 0.0, NOT_PRESSING, 0.0, 0.0, False)
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def decide(rule: Operator, decision: Decision, looks_right: bool, pulled: bool, held: bool) -> Decision:
     """Press once the tip has looked right long enough; give a grasp up that caught nothing; report an item.
 

@@ -1,8 +1,9 @@
 """Shared control of a soft-growing arm: six paradigms, two haptic assistances and the goal machine.
 
 Every rule of the paper is a small function of plain numbers. The classes call it one sample at a time; the
-simulator compiles the very same function, so that the two cannot drift apart. Vectors inside the rules are
-triples of floats, lengths in metres in the base frame of the robot (x, y horizontal, z down).
+simulator compiles the very same function (inlined, for speed), so that the two cannot drift apart. Vectors
+inside the rules are triples of floats, lengths in metres in the base frame of the robot (x, y horizontal,
+z down).
 
 Source: Stroppa et al., Shared-Control Teleoperation Paradigms on a Soft-Growing Robot Manipulator, Section 4.
 """

@@ -47,7 +47,7 @@ class AssistState(NamedTuple):
 ASSIST_START = AssistState(stiffness=0.0, distance=-1.0, motion=START, elapsed=0.0)
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def classify_motion(rule: AssistRule, previous_distance: float, distance: float, samples: float) -> int:
     """Where the tip is heading: one of the states of Fig. 5 (Stroppa et al., Table 3 for the thresholds)."""
     if previous_distance < 0.0:
@@ -62,7 +62,7 @@ def classify_motion(rule: AssistRule, previous_distance: float, distance: float,
     return STEADY
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def reaction_counter(shared: bool, previous: int, motion: int, elapsed: float, samples: float) -> float:
     """Time tau spent waiting [samples]: zero on entry, then counting.
 
@@ -74,7 +74,7 @@ def reaction_counter(shared: bool, previous: int, motion: int, elapsed: float, s
     return elapsed + samples if same or (shared and both_poor) else 0.0
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def stiffness_change(rule: AssistRule, motion: int, elapsed: float) -> float:
     """Direction in which the stiffness moves: +1, 0 or -1 (Stroppa et al., Eq. (3), Errata SC-1, SC-5, SC-6).
 
@@ -92,7 +92,7 @@ def stiffness_change(rule: AssistRule, motion: int, elapsed: float) -> float:
     return 0.0
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def assist_step(rule: AssistRule, state: AssistState, distance: float, samples: float) -> AssistState:
     """One iteration of assist-as-needed (Stroppa et al., Eq. (3) and Fig. 5).
 

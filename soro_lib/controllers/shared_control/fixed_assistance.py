@@ -39,7 +39,7 @@ class FixedState(NamedTuple):
 FIXED_START = FixedState(distance=-1.0, place=0, magnitude=0.0)
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def fixed_step(
     rule: FixedRule, state: FixedState, window: NDArray[np.float64], distance: float, samples: float
 ) -> FixedState:

@@ -60,7 +60,7 @@ PARADIGMS = {
 }
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def desired_position(command: Vector, goal: Vector, automation: Vector) -> Vector:
     """Blend the operator's command with the goal, axis by axis.
 

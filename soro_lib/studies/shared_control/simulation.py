@@ -91,7 +91,7 @@ class TrialPlan:
     labels: Mapping[str, Any] = field(default_factory=dict)
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def next_place(task: TaskRule, state: TaskState, items: NDArray[np.float64]) -> Vector:
     """Where the operator wants to go: the target of the item in the gripper, else the next item."""
     if state.gripper.item != NOTHING:
@@ -101,7 +101,7 @@ def next_place(task: TaskRule, state: TaskState, items: NDArray[np.float64]) -> 
     return (items[item, 0], items[item, 1], items[item, 2])
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def write_trace(line: NDArray[np.float64], task: TaskRule, state: TaskState, command: Any) -> None:
     """Fill one line of the trace."""
     line[0] = SAMPLE_TIME * state.sample
@@ -120,7 +120,7 @@ def write_trace(line: NDArray[np.float64], task: TaskRule, state: TaskState, com
     line[22] = state.closed
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def play(
     task: TaskRule,
     state: TaskState,
