@@ -1,8 +1,8 @@
 """What the handover study takes from the thesis: plant K's three shares, and the length of a timestep.
 
-Plant K is fitted to three printed numbers (Vervloet, Section 5.2: 16, 29 and 14 cm) and to nothing else; these three
-count as calibrated, never as reproduced. The timestep is the speed of the thesis's laptop; with it, steps become
-seconds.
+Plant K is fitted to three printed numbers (Vervloet, Section 5.2: 16, 29 and 14 cm) and to nothing else;
+these three count as calibrated, never as reproduced. The timestep is the speed of the thesis's laptop; with
+it, steps become seconds.
 """
 
 import tomllib
@@ -43,7 +43,8 @@ def timestep(step_size: float) -> float:
 
 
 def final_distances(realised: NDArray[np.float64], step_limit: int = 120) -> NDArray[np.float64]:
-    """Return measured and commanded distance of the gripper and their gap (3,) [m] at the end of a still handover.
+    """Return measured and commanded distance of the gripper and their gap (3,) [m] at the end of a still
+    handover.
 
     Mean over the four locations, step size 0.1, without noise.
     """

@@ -27,6 +27,8 @@ from soro_lib.robots.helix_kernels import (
     unreachable_direction,
 )
 
+Array = NDArray[np.float64]
+
 HELIX = HelixArm()
 """The arm of the thesis."""
 
@@ -47,7 +49,7 @@ DAMPING = 1e-12
 """Damping of the rank-5 inverse, as a share of the mean eigenvalue."""
 
 
-def state_limits(arm: HelixArm) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def state_limits(arm: HelixArm) -> tuple[Array, Array]:
     """Return the lower and upper bounds (6,) of (d1, l1, d2, l2, d3, l3) (Vervloet, Eqs. (10)-(11))."""
     lower = np.stack([np.zeros(3), arm.minimum_lengths], axis=-1).ravel()
     upper = np.stack([arm.maximum_bends, arm.maximum_lengths], axis=-1).ravel()
@@ -61,7 +63,7 @@ def within_limits(q: ArrayLike, arm: HelixArm = HELIX, slack: float = 1e-9) -> b
     return bool((bends_and_lengths >= lower - slack).all() and (bends_and_lengths <= upper + slack).all())
 
 
-def weighted_pseudo_inverse(jacobian: ArrayLike, inverse_stiffness: ArrayLike) -> NDArray[np.float64]:
+def weighted_pseudo_inverse(jacobian: ArrayLike, inverse_stiffness: ArrayLike) -> Array:
     """Return ``K^-1 J' (J K^-1 J')^+`` (Vervloet, Eq. (19)); with unit stiffness the ``J^+`` of Eq. (17).
 
     The thesis prints an inverse, which does not exist: wrist and gripper keep their distance, so J has rank 5
@@ -83,14 +85,14 @@ def weighted_pseudo_inverse(jacobian: ArrayLike, inverse_stiffness: ArrayLike) -
     return compliant @ np.linalg.pinv(matrix @ compliant, rcond=1e-8, hermitian=True)
 
 
-def step_towards(measured_points: ArrayLike, goal_points: ArrayLike, step_size: float) -> NDArray[np.float64]:
+def step_towards(measured_points: ArrayLike, goal_points: ArrayLike, step_size: float) -> Array:
     """Return ``X_goal,alpha = alpha X_goal + (1 - alpha) X_meas`` (Vervloet, Eq. (21))."""
     return step_size * np.asarray(goal_points) + (1 - step_size) * np.asarray(measured_points)
 
 
 def jacobian_step(
     q: ArrayLike, jacobian: ArrayLike, error: ArrayLike, step_size: float, inverse_stiffness: ArrayLike
-) -> NDArray[np.float64]:
+) -> Array:
     """Return ``q + alpha J_K^+ e``, one step without limits (Vervloet, Eqs. (17), (18), (20) and (22)).
 
     Unit stiffness gives Eqs. (17)-(18); ``step_size = 1`` with the error towards :func:`step_towards` gives
@@ -102,7 +104,7 @@ def jacobian_step(
 
 
 @njit(cache=True)
-def limit_state_in_place(q, inverse_stiffness, lower, upper):
+def limit_state_in_place(q: Array, inverse_stiffness: Array, lower: Array, upper: Array) -> int:
     """Crop `q` (9,) to the limits and stiffen what was cropped, both in place; return the number of crops."""
     crops = 0
     for i in range(3):
@@ -128,9 +130,7 @@ def limit_state_in_place(q, inverse_stiffness, lower, upper):
     return crops
 
 
-def limit_state(
-    q: ArrayLike, inverse_stiffness: ArrayLike, arm: HelixArm = HELIX
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def limit_state(q: ArrayLike, inverse_stiffness: ArrayLike, arm: HelixArm = HELIX) -> tuple[Array, Array]:
     """Return the state within its limits and the inverse stiffness, smaller where a limit was met.
 
     Vervloet, Algorithm 2 (SKU), corrected: magnitudes are compared and signs kept (Erratum SH-12), the
@@ -165,7 +165,7 @@ def limit_state(
     state = np.array(q, dtype=float)
     softness = np.array(inverse_stiffness, dtype=float)
     if state.shape != (9,) or not np.isfinite(state).all():
-        raise ValueError(f"q must be nine finite numbers, got {q}")
+        raise ValueError(f"q must be nine finite numbers, got {q!r}")
     if softness.shape not in ((9,), (9, 9)):
         raise ValueError(f"inverse_stiffness must have shape (9,) or (9, 9), got {softness.shape}")
     diagonal = softness.diagonal().copy() if softness.ndim == 2 else softness
@@ -176,7 +176,7 @@ def limit_state(
 
 
 @njit(cache=True)
-def weighted_step(jacobian, inverse_stiffness, error, stretch):
+def weighted_step(jacobian: Array, inverse_stiffness: Array, error: Array, stretch: Array) -> Array:
     """Return ``K^-1 J' (J K^-1 J')^+ e`` without a singular value decomposition.
 
     The one direction that J cannot reach is known (`stretch`): filling it makes the matrix invertible, and
@@ -194,19 +194,19 @@ def weighted_step(jacobian, inverse_stiffness, error, stretch):
 
 @njit(cache=True)
 def reach_goal(
-    q_sys,
-    q_est,
-    goal_step,
-    measured_points,
-    inverse_stiffness,
-    lower,
-    upper,
-    tolerance,
-    max_iterations,
-    early_exit,
-    from_measurement,
-    gripper_length,
-):
+    q_sys: Array,
+    q_est: Array,
+    goal_step: Array,
+    measured_points: Array,
+    inverse_stiffness: Array,
+    lower: Array,
+    upper: Array,
+    tolerance: float,
+    max_iterations: int,
+    early_exit: bool,
+    from_measurement: bool,
+    gripper_length: float,
+) -> tuple[Array, Array, float, int, bool, int]:
     """Run Algorithm 1 from line 7 on; return (q_sys, q_est, residual, iterations, converged, crops)."""
     q_sys = q_sys.copy()
     q_est = q_est.copy()
@@ -263,8 +263,8 @@ class ControlStep:
         "", or why the goal of this step was not reached.
     """
 
-    q_sys: NDArray[np.float64]
-    q_est: NDArray[np.float64]
+    q_sys: Array
+    q_est: Array
     residual: float
     iterations: int
     converged: bool
@@ -375,7 +375,7 @@ class VirtualStiffnessController:
         ):
             array = np.array(values, dtype=float)
             if array.shape != (size,) or not np.isfinite(array).all():
-                raise ValueError(f"{name} must be {size} finite numbers, got {values}")
+                raise ValueError(f"{name} must be {size} finite numbers, got {values!r}")
             arrays.append(array)
         commanded, estimated, goal, measured = arrays
         step_size = self.step_size

@@ -21,6 +21,8 @@ from soro_lib.robots.helix_kernels import (
     unreachable_direction,
 )
 
+Array = NDArray[np.float64]
+
 GRIPPER_LENGTH = 0.10
 """Distance from wrist to gripper [m] (Vervloet, Appendix A)."""
 
@@ -53,7 +55,7 @@ class ShapeEstimate:
         "", or why there is no optimum to hand back.
     """
 
-    q: NDArray[np.float64]
+    q: Array
     cost: float
     residual: float
     iterations: int
@@ -122,7 +124,7 @@ def estimate_shape(
 
 def checked_arguments(
     q_sys: ArrayLike, measured_points: ArrayLike, bound: float, weights: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array, Array]:
     """Return the three arrays as contiguous floats, or raise ValueError naming the one that is wrong."""
     arrays = []
     for name, values, size in (
@@ -144,7 +146,9 @@ def checked_arguments(
 
 
 @njit(cache=True)
-def sequential_least_distance(q_sys, measured_points, bound, weights, gripper_length):
+def sequential_least_distance(
+    q_sys: Array, measured_points: Array, bound: float, weights: Array, gripper_length: float
+) -> tuple[Array, int, bool]:
     """Return (q, iterations, whether the iteration came to rest) of Eq. (16)."""
     q = q_sys.copy()
     multiplier = 0.0
@@ -165,7 +169,9 @@ def sequential_least_distance(q_sys, measured_points, bound, weights, gripper_le
 
 
 @njit(cache=True)
-def least_distance(matrix, residual, stretch, bound, multiplier):
+def least_distance(
+    matrix: Array, residual: Array, stretch: Array, bound: float, multiplier: float
+) -> tuple[Array, float]:
     """Return the shortest p with ``|matrix p + residual| <= bound`` and its Lagrange multiplier.
 
     The answer leaves ``rho = (I + t B)^-1 residual`` with ``B = matrix matrix'`` and is ``p = -t matrix'
@@ -207,18 +213,24 @@ def estimate_shape_by_slsqp(
 
     commanded, points, scale = checked_arguments(q_sys, measured_points, bound, weights)
 
-    def slack(q: NDArray[np.float64]) -> float:
+    def slack(q: Array) -> float:
         miss = tip_points_and_jacobian(q, gripper_length)[0] - points
         return float(bound**2 - miss @ miss)
 
-    def slack_gradient(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slack_gradient(q: Array) -> Array:
         tip, jacobian = tip_points_and_jacobian(q, gripper_length)
         return -2 * jacobian.T @ (tip - points)
 
+    def cost(q: Array) -> float:
+        return float(np.sum((scale * (q - commanded)) ** 2))
+
+    def cost_gradient(q: Array) -> Array:
+        return 2 * scale**2 * (q - commanded)
+
     result = minimize(
-        fun=lambda q: np.sum((scale * (q - commanded)) ** 2),
-        jac=lambda q: 2 * scale**2 * (q - commanded),
-        x0=commanded,
+        cost,
+        commanded,
+        jac=cost_gradient,
         constraints={"type": "ineq", "fun": slack, "jac": slack_gradient},
         method="SLSQP",
         options={"ftol": 1e-12, "maxiter": 200},

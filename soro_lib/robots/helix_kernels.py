@@ -7,12 +7,15 @@ Frame `arm_base`, z down; lengths in m, angles in rad. ``kernel.py_func`` is the
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 SEGMENTS = 3
 
 
 @njit(cache=True)
-def arc_coefficients(angle):
+def arc_coefficients(angle: float) -> tuple[float, float, float, float, float]:
     """Return sin(D)/D, (1-cos D)/D^2, (D-sin D)/D^3 and the slopes of the first two, each over D."""
     square = angle * angle
     if angle < 0.1:
@@ -32,7 +35,7 @@ def arc_coefficients(angle):
 
 
 @njit(cache=True)
-def arc(dx, dy, length, rotation, translation):
+def arc(dx: float, dy: float, length: float, rotation: Array, translation: Array) -> None:
     """Write the rotation (3, 3) and translation (3,) of one arc (Vervloet, Eqs. (4)-(5), errata SH-2,
     SH-3)."""
     sine, cosine, _, _, _ = arc_coefficients(np.sqrt(dx * dx + dy * dy))
@@ -50,7 +53,7 @@ def arc(dx, dy, length, rotation, translation):
 
 
 @njit(cache=True)
-def arc_derivatives(dx, dy, length, velocity, spin):
+def arc_derivatives(dx: float, dy: float, length: float, velocity: Array, spin: Array) -> None:
     """Write the columns d(translation)/d(dx, dy, length) and the angular velocities, both (3, 3), in the
     arc's base."""
     sine, cosine, cubic, sine_slope, cosine_slope = arc_coefficients(np.sqrt(dx * dx + dy * dy))
@@ -72,7 +75,7 @@ def arc_derivatives(dx, dy, length, velocity, spin):
 
 
 @njit(cache=True)
-def tip_points_and_jacobian(q, gripper_length):
+def tip_points_and_jacobian(q: Array, gripper_length: float) -> tuple[Array, Array]:
     """Return wrist and gripper (6,) and their Jacobian (6, 9) at the state q (9,), in `arm_base`.
 
     Vervloet, Eqs. (4)-(7) and (12). An arc's angular velocity turns everything beyond its end about that end.
@@ -116,7 +119,7 @@ def tip_points_and_jacobian(q, gripper_length):
 
 
 @njit(cache=True)
-def rotate(frame, x, y, z):
+def rotate(frame: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return frame @ (x, y, z) as three numbers."""
     return (
         frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z,
@@ -126,7 +129,9 @@ def rotate(frame, x, y, z):
 
 
 @njit(cache=True)
-def depth_moment(q, segment_masses, masses_per_segment, tip_mass, tip_distance):
+def depth_moment(
+    q: Array, segment_masses: Array, masses_per_segment: int, tip_mass: float, tip_distance: float
+) -> tuple[float, Array]:
     """Return sum(m z) [kg m] of an arm with lumped masses and its gradient (9,): gravity's energy is -g
     times it.
 
@@ -180,7 +185,7 @@ def depth_moment(q, segment_masses, masses_per_segment, tip_mass, tip_distance):
 
 
 @njit(cache=True)
-def cholesky(matrix):
+def cholesky(matrix: Array) -> Array:
     """Return the lower factor of a positive definite matrix; its [0, 0] is NaN if the matrix is not."""
     n = matrix.shape[0]
     factor = np.zeros((n, n))
@@ -200,7 +205,7 @@ def cholesky(matrix):
 
 
 @njit(cache=True)
-def cholesky_solve(factor, vector):
+def cholesky_solve(factor: Array, vector: Array) -> Array:
     """Return x with ``factor factor' x = vector``."""
     n = vector.shape[0]
     x = vector.copy()
@@ -216,7 +221,7 @@ def cholesky_solve(factor, vector):
 
 
 @njit(cache=True)
-def multiply(matrix, vector):
+def multiply(matrix: Array, vector: Array) -> Array:
     """Return matrix @ vector; plain loops beat BLAS at these sizes."""
     product = np.zeros(matrix.shape[0])
     for i in range(matrix.shape[0]):
@@ -226,7 +231,7 @@ def multiply(matrix, vector):
 
 
 @njit(cache=True)
-def outer_gram(matrix):
+def outer_gram(matrix: Array) -> Array:
     """Return matrix @ matrix.T."""
     n = matrix.shape[0]
     gram = np.zeros((n, n))
@@ -239,7 +244,7 @@ def outer_gram(matrix):
 
 
 @njit(cache=True)
-def unreachable_direction(points):
+def unreachable_direction(points: Array) -> Array:
     """Return the unit vector (6,) along which no state moves the tip: stretching the rigid gripper (Erratum
     SH-9)."""
     normal = np.empty(6)

@@ -28,6 +28,8 @@ from soro_lib.robots.helix_kernels import (
     tip_points_and_jacobian,
 )
 
+Array = NDArray[np.float64]
+
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
 
@@ -56,14 +58,14 @@ class Hand:
         Of the grip, at each of the two points [N/m].
     """
 
-    points: NDArray[np.float64]
+    points: Array
     stiffness: float = 200.0
 
 
 class HelixPlant(Protocol):
     """What a simulated arm offers to a study."""
 
-    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
+    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> Array:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m]."""
         ...
 
@@ -96,7 +98,7 @@ class Stiffness:
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
 
-    def diagonal(self, arm: HelixArm) -> NDArray[np.float64]:
+    def diagonal(self, arm: HelixArm) -> Array:
         """Return the stiffness of each coordinate of q (9,): Nm/rad for angles, N/m for lengths."""
         lengths = np.asarray(arm.rest_lengths)
         return np.stack(
@@ -142,7 +144,7 @@ class AngleLossPlant:
     def carry(self, mass: float) -> None:
         """Take a mass [kg] without any effect: this plant knows no weight."""
 
-    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
+    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> Array:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m].
 
         Without play the state depends on the command alone. A hand moves it to the least energy of arm and
@@ -163,7 +165,7 @@ class AngleLossPlant:
 
 
 @njit(cache=True)
-def held_state(free, stiffness, held, grip, gripper_length):
+def held_state(free: Array, stiffness: Array, held: Array, grip: float, gripper_length: float) -> Array:
     """Return the state of least ``(q - free)' K (q - free) + grip |f(q) - held|^2``, by Gauss-Newton."""
     q = free.copy()
     for _ in range(50):
@@ -232,7 +234,7 @@ class ElasticPlant:
         """Hang a mass [kg] into the gripper, where its own mass is."""
         self._payload = mass
 
-    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
+    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> Array:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m].
 
         The search starts from the last state, as the arm does.
@@ -268,21 +270,21 @@ class ElasticPlant:
 class LoadedArm(NamedTuple):
     """What the energy of plant E depends on besides its state; arrays in SI units, see `ElasticPlant`."""
 
-    tendons: NDArray[np.float64]
-    tendon_map: NDArray[np.float64]
+    tendons: Array
+    tendon_map: Array
     tendon_stiffness: float
-    stiffness: NDArray[np.float64]
-    free: NDArray[np.float64]
-    masses: NDArray[np.float64]
+    stiffness: Array
+    free: Array
+    masses: Array
     tip_mass: float
     tip_distance: float
-    held: NDArray[np.float64]
+    held: Array
     grip: float
     gripper_length: float
 
 
 @njit(cache=True)
-def equilibrium(q, arm):
+def equilibrium(q: Array, arm: LoadedArm) -> tuple[Array, bool]:
     """Return the state of least energy near q and whether the search came to rest (damped Newton)."""
     scale = np.array([1.0, 1.0, 0.1] * 3)
     energy = potential_energy(q, arm)
@@ -309,7 +311,7 @@ def equilibrium(q, arm):
 
 
 @njit(cache=True)
-def potential_energy(q, arm):
+def potential_energy(q: Array, arm: LoadedArm) -> float:
     """Return the energy [J] of gravity, bending, stretching, tendons and holding hand."""
     stretch = np.maximum(multiply(arm.tendon_map, q) - arm.tendons, 0.0)
     moment, _ = depth_moment(q, arm.masses, LUMPS, arm.tip_mass, arm.tip_distance)
@@ -322,7 +324,7 @@ def potential_energy(q, arm):
 
 
 @njit(cache=True)
-def energy_slopes(q, arm):
+def energy_slopes(q: Array, arm: LoadedArm) -> tuple[Array, Array]:
     """Return gradient (9,) and Hessian (9, 9) of `potential_energy`; gravity's curvature by differences."""
     gradient = arm.stiffness * (q - arm.free)
     hessian = np.diag(arm.stiffness)
@@ -366,7 +368,7 @@ class LaggingPlant:
         for name in ("timestep", "time_constant"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        self._state: NDArray[np.float64] | None = None
+        self._state: Array | None = None
 
     def reset(self) -> None:
         """Forget where the arm is; the next call finds it at rest."""
@@ -377,7 +379,7 @@ class LaggingPlant:
         """Hang a mass [kg] into the gripper."""
         self.plant.carry(mass)
 
-    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> NDArray[np.float64]:
+    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> Array:
         """Return the true state q (9,) one timestep later."""
         rest = self.plant.settle(tendon_lengths, hand)
         left = np.exp(-self.timestep / self.time_constant)
@@ -413,7 +415,7 @@ class TendonMotors:
         if self.ticks_per_turn < 1:
             raise ValueError(f"ticks_per_turn must be at least 1, got {self.ticks_per_turn}")
 
-    def clip(self, tendon_change: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def clip(self, tendon_change: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
         """Return the change (9,) [m] within the motors' range, and which tendons were cut short.
 
         Raises
@@ -423,11 +425,11 @@ class TendonMotors:
         """
         change = np.asarray(tendon_change, dtype=float)
         if change.shape != (9,) or not np.isfinite(change).all():
-            raise ValueError(f"tendon_change must be nine finite numbers, got {tendon_change}")
+            raise ValueError(f"tendon_change must be nine finite numbers, got {tendon_change!r}")
         clipped = np.clip(change, self.shortest, self.longest)
         return clipped, clipped != change
 
-    def pull(self, tendon_change: ArrayLike) -> NDArray[np.float64]:
+    def pull(self, tendon_change: ArrayLike) -> Array:
         """Return the tendon lengths (9,) [m] that the motors realise: within range, to the nearest encoder
         tick."""
         change, _ = self.clip(tendon_change)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from soro_lib.project import data_directory
 from soro_lib.robots.helix import HelixArm
@@ -145,7 +145,9 @@ class NoisyObserver:
         self._bias: NDArray[np.float64] | None = None
         self._wrist = np.zeros(3)
 
-    def observe(self, state: ArrayLike, ball: ArrayLike, rng: np.random.Generator) -> HandoverObservation:
+    def observe(
+        self, state: NDArray[np.float64], ball: NDArray[np.float64], rng: np.random.Generator
+    ) -> HandoverObservation:
         """Return what is seen of the true state q (9,) and the true ball (3,) [m]."""
         points = self.arm.tip_points(state)
         wrist = points[:3]
@@ -159,7 +161,7 @@ class NoisyObserver:
         return HandoverObservation(
             wrist=wrist + noise.wrist_jitter * jitter[0] + noise.wrist_bias * bias[0],
             direction=seen_direction / np.linalg.norm(seen_direction),
-            ball=np.asarray(ball) + ball_deviation * jitter[2] + noise.ball_bias * bias[2],
+            ball=ball + ball_deviation * jitter[2] + noise.ball_bias * bias[2],
             wrist_deviation=float(np.hypot(noise.wrist_jitter, noise.wrist_bias)),
             direction_deviation=float(np.hypot(noise.direction_jitter, noise.direction_bias)),
             ball_deviation=float(np.hypot(ball_deviation, noise.ball_bias)),

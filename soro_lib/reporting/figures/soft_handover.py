@@ -321,7 +321,7 @@ def estimated_shapes(table: pd.DataFrame) -> Figure:
     table = table.assign(length_miss_mm=table["length_error_mm"].abs())
     weights = sorted(table["length_weight"].unique())
     for plant, group in table.groupby("plant", sort=False):
-        color = PLANT_COLORS[plant]
+        color = PLANT_COLORS[str(plant)]
         by_weight = group.groupby("length_weight")
         panels[0].plot(
             weights, by_weight["length_miss_mm"].median(), color=color, marker="o", label=f"plant {plant}"

@@ -194,6 +194,7 @@ def run_handover(
     success = command.mode is Mode.GRASP and gripper.holds(points, held_ball)
     unit = np.array([1.0 if name == "descending" else 1e3 for name in TRACE_COLUMNS])
     trace = dict(zip(TRACE_COLUMNS, (unit * np.array(rows, dtype=float)).T))
+    states, commands, estimates = np.array(shapes).swapaxes(0, 1)
     return HandoverRun(
         step,
         command.mode,
@@ -203,7 +204,9 @@ def run_handover(
         overshoot,
         state,
         held_ball,
-        *np.array(shapes).swapaxes(0, 1),
+        states,
+        commands,
+        estimates,
         trace,
     )
 

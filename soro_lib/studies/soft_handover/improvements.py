@@ -117,14 +117,15 @@ def loop_speed(
                     runs, _ = handovers(
                         parameters, lagging, observer, repetitions, seed, step_limit=step_limit
                     )
-                    labels = {
-                        "plant": plant_name,
-                        "controller": name,
-                        "timestep_s": timestep,
-                        "time_constant_s": time_constant,
-                        "time_s": runs["steps"] * timestep,
-                    }
-                    tables.append(runs.assign(**labels))
+                    tables.append(
+                        runs.assign(
+                            plant=plant_name,
+                            controller=name,
+                            timestep_s=timestep,
+                            time_constant_s=time_constant,
+                            time_s=runs["steps"] * timestep,
+                        )
+                    )
     return pd.concat(tables, ignore_index=True)
 
 

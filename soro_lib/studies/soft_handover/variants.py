@@ -146,8 +146,10 @@ def filter_cap(
     for step_size in step_sizes:
         for label, filters in (("Appendix A", APPENDIX_A), ("no filter", NO_FILTER)):
             parameters = replace(thesis_parameters(step_size), filters=filters)
-            labels = {"alpha": step_size, "filters": label}
-            tables.append(handovers(parameters, plant, observer, repetitions, seed, **labels)[0])
+            runs, _ = handovers(
+                parameters, plant, observer, repetitions, seed, alpha=step_size, filters=label
+            )
+            tables.append(runs)
     return pd.concat(tables, ignore_index=True)
 
 
@@ -217,9 +219,16 @@ def without_estimation(
         for step_size in step_sizes:
             for estimated in (True, False):
                 parameters = replace(thesis_parameters(step_size), estimate_shape=estimated)
-                labels = {"plant": name, "alpha": step_size, "estimated": estimated}
                 run, trace = handovers(
-                    parameters, plant, observer, repetitions, seed, step_limit=step_limit, **labels
+                    parameters,
+                    plant,
+                    observer,
+                    repetitions,
+                    seed,
+                    step_limit=step_limit,
+                    plant=name,
+                    alpha=step_size,
+                    estimated=estimated,
                 )
                 runs.append(run)
                 traces.append(trace)
