@@ -1,0 +1,115 @@
+"""The handover without its cameras: state optimisation, control step, plants, two hundred handovers.
+
+The optima of both solvers are the same (checked before anything is timed) on the same hundred states of a
+sagging arm.
+"""
+
+import time
+
+import numpy as np
+
+from benchmarks.run import Row, compare
+from soro_lib.calibrations.soft_handover import plant_k
+from soro_lib.controllers import VirtualStiffnessController
+from soro_lib.controllers.handover import HandoverController, Mode
+from soro_lib.controllers.virtual_stiffness import reach_goal, state_limits, step_towards
+from soro_lib.estimators import estimate_shape
+from soro_lib.estimators.shape_estimation import estimate_shape_by_slsqp
+from soro_lib.robots import HelixArm
+from soro_lib.robots.helix_plant import ElasticPlant
+from soro_lib.sensing.handover_observation import NoisyObserver, load_vision_noise
+from soro_lib.studies.soft_handover.handover import Scene, handovers, thesis_parameters
+
+ARM = HelixArm()
+CASES = 100
+
+
+def rows() -> list[Row]:
+    """Return the comparisons of the handover."""
+    return [*state_optimisation(), *inner_loop(), control_step(), equilibrium(), handovers_per_minute()]
+
+
+def state_optimisation() -> list[Row]:
+    """Time a hundred state optimisations against SLSQP with analytic gradients."""
+    rng = np.random.default_rng(1)
+    plant = plant_k()
+    cases = []
+    for _ in range(CASES):
+        commanded = rng.uniform(0.7 * ARM.lower + 0.3 * ARM.home, 0.7 * ARM.upper + 0.3 * ARM.home)
+        cases.append((commanded, ARM.tip_points(plant.settle(ARM.tendon_lengths(commanded)))))
+    for case in cases:
+        np.testing.assert_allclose(estimate_shape(*case).q, estimate_shape_by_slsqp(*case).q, atol=1e-5)
+    return compare(
+        f"state optimisation, Eq. (16), {CASES} states",
+        lambda: [estimate_shape(*case) for case in cases],
+        {
+            "SciPy SLSQP, analytic gradients (goal: 20 times)": lambda: [
+                estimate_shape_by_slsqp(*case) for case in cases
+            ]
+        },
+        "ms",
+    )
+
+
+def inner_loop() -> list[Row]:
+    """Time Algorithm 1 against its outer loop uncompiled."""
+    control = VirtualStiffnessController(step_size=0.4)
+    measured = ARM.tip_points(ARM.home)
+    goal = measured + np.array([0.15, 0, -0.06, 0.15, 0, -0.06])
+    arguments = (
+        ARM.home, ARM.home, step_towards(measured, goal, 0.4), measured, 1 / np.array(control.stiffness),
+        *state_limits(ARM), 0.005, 20, False, False, 0.1,
+    )  # fmt: skip
+    return compare(
+        "20 iterations, Algorithm 1",
+        lambda: reach_goal(*arguments),
+        {"its outer loop without numba": lambda: reach_goal.py_func(*arguments)},
+    )
+
+
+def control_step() -> Row:
+    """Time control steps (filters, state optimisation, Algorithm 1, tendons) over whole handovers; the
+    median."""
+    eyes, plant, rng = NoisyObserver(load_vision_noise("thesis")), plant_k(), np.random.default_rng(1)
+    controller = HandoverController(thesis_parameters(0.2))
+    calibrated = ARM.tendon_lengths(ARM.home)
+    durations = []
+    for _ in range(20):
+        for part in (controller, eyes, plant):
+            part.reset()
+        ball = Scene().ball("front", ARM.tip_points(ARM.home)[3:], rng)
+        state = plant.settle(calibrated)
+        for _ in range(60):
+            look = eyes.observe(state, ball, rng)
+            start = time.perf_counter()
+            command = controller.update(look)
+            durations.append(time.perf_counter() - start)
+            if command.mode is Mode.GRASP:
+                break
+            state = plant.settle(calibrated + command.tendon_change)
+    median, slow = 1e3 * np.percentile(durations, [50, 95])
+    return Row(
+        "control step without cameras, median", float(median), "ms", f"95 % within {slow:.2f} ms", None, 0.5
+    )
+
+
+def equilibrium() -> Row:
+    """Time plant E following a random walk of commands; the median."""
+    plant, rng, durations = ElasticPlant(), np.random.default_rng(1), []
+    command = ARM.home.copy()
+    for _ in range(300):
+        command = ARM.clip(command + 0.03 * rng.standard_normal(9) * np.tile([1, 1, 0.1], 3)).actuation
+        tendons = ARM.tendon_lengths(command)
+        start = time.perf_counter()
+        plant.settle(tendons)
+        durations.append(time.perf_counter() - start)
+    return Row(
+        "plant E, one equilibrium, median", 1e3 * float(np.median(durations)), "ms", "no peer", None, 1.0
+    )
+
+
+def handovers_per_minute() -> Row:
+    """Time two hundred whole handovers on plant K at step size 0.1, the slowest."""
+    start = time.perf_counter()
+    handovers(thesis_parameters(0.1), plant_k(), NoisyObserver(load_vision_noise("thesis")), 25, 1)
+    return Row("200 handovers without rendering", time.perf_counter() - start, "s", "one core", None, 60.0)
