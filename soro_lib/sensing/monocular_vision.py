@@ -8,16 +8,15 @@ The map has no scale of its own: :func:`fit_similarity` is Eq. (30).
 The map's frame is the first camera's. Lengths in it are in units of the first median depth.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from soro_lib.sensing.bundle_adjustment import adjust, projection_jacobian
+from soro_lib.sensing.feature_matching import FeatureDetector, Features, match_descriptors, match_near
 from soro_lib.sensing.rendering import Camera, invert_pose, transform_points
 
 Array = NDArray[np.float64]
@@ -101,17 +100,6 @@ class TrackerSettings:
 
 
 @dataclass(frozen=True)
-class Features:
-    """Features of one image: undistorted pixels (n, 2) and binary descriptors (n, 32) uint8."""
-
-    pixels: Array
-    descriptors: NDArray[np.uint8]
-
-    def __len__(self) -> int:
-        return len(self.pixels)
-
-
-@dataclass(frozen=True)
 class Keyframe:
     """A view kept for the map: its pose in it, its features and the map point of each (-1 for none).
 
@@ -187,18 +175,23 @@ class MonocularTracker:
         Calibrated camera.
     settings : TrackerSettings, optional
         Thresholds.
+    point_map : PointMap, optional
+        A map made before, for :meth:`find`; :meth:`track` makes its own.
     """
 
-    def __init__(self, camera: Camera, settings: TrackerSettings | None = None) -> None:
+    def __init__(
+        self, camera: Camera, settings: TrackerSettings | None = None, point_map: PointMap | None = None
+    ) -> None:
         self.camera = camera
         self.settings = settings or TrackerSettings()
-        self.map = PointMap()
+        self.map = point_map or PointMap()
         self.keyframes: list[Keyframe] = []
-        self._orb = cv2.ORB.create(
-            4 * self.settings.features,
-            scaleFactor=1.2,
-            nlevels=self.settings.levels,
-            fastThreshold=self.settings.corner_threshold,
+        self._detector = FeatureDetector(
+            camera,
+            self.settings.features,
+            self.settings.cells,
+            self.settings.levels,
+            self.settings.corner_threshold,
         )
         self._reference: Features | None = None
         self._pose = np.eye(4)
@@ -227,96 +220,88 @@ class MonocularTracker:
         ValueError
             If the image has the wrong size or type.
         """
-        features = self.detect(image)
-        if not self.initialised:
-            return self._initialise(features)
+        features = self._detector.detect(image)
+        if not self.initialised and not self._initialise(features):
+            return TrackedFrame(self._pose, False, len(features))
         if self._lost and self._lost % self.settings.relocalise_every == 0:
-            return self._relocalise(features)
-        gate = min(self.settings.gate + self.settings.gate_growth * self._lost, self.settings.largest_gate)
-        predicted = self._pose if self._lost else self._pose @ self._motion
-        return self._locate(features, predicted, gate)
+            frame, owner = self._relocalise(features)
+        else:
+            gate = min(
+                self.settings.gate + self.settings.gate_growth * self._lost, self.settings.largest_gate
+            )
+            predicted = self._pose if self._lost else self._pose @ self._motion
+            frame, owner = self._locate(features, predicted, gate)
+        if not frame.tracked:
+            self._lost += 1
+            return replace(frame, pose=self._pose)
+        self._motion = np.eye(4) if self._lost else invert_pose(self._pose) @ frame.pose
+        self._pose, self._lost = frame.pose, 0
+        if self._is_new(frame):
+            self._add_keyframe(frame.pose, features, owner)
+        return replace(frame, pose=self._pose)
 
-    def detect(self, image: NDArray[np.uint8] | None) -> Features:
-        """Return the ORB features of an image; none for None."""
-        if image is None:
-            return Features(np.zeros((0, 2)), np.zeros((0, 32), dtype=np.uint8))
-        size = (self.camera.height, self.camera.width)
-        if (
-            not isinstance(image, np.ndarray)
-            or image.dtype != np.uint8
-            or image.shape not in (size, (*size, 3))
-        ):
-            found = f"{image.dtype} {image.shape}" if isinstance(image, np.ndarray) else repr(type(image))
-            raise ValueError(f"image must be uint8 of shape {size} or {(*size, 3)}, got {found}")
-        if image.ndim == 3:
-            image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        keypoints, descriptors = self._orb.compute(image, self._spread_out(self._orb.detect(image)))
-        if descriptors is None:
-            return self.detect(None)
-        pixels = np.array(cv2.KeyPoint.convert(keypoints), dtype=float)
-        if self.camera.distortion:
-            pixels = (self.camera.rays(pixels) @ self.camera.matrix.T)[:, :2]
-        return Features(pixels, np.asarray(descriptors, dtype=np.uint8))
+    def find(self, image: NDArray[np.uint8] | None, near: Array | None = None) -> TrackedFrame:
+        """Locate the camera in the map as it is, without tracking on from there.
 
-    def _spread_out(self, keypoints: Sequence[cv2.KeyPoint]) -> list[cv2.KeyPoint]:
-        """Return the strongest keypoints of every cell, so that no corner of the image holds them all."""
-        if not keypoints:
-            return []
-        size = max(self.camera.width, self.camera.height) / self.settings.cells
-        cell = (np.array(cv2.KeyPoint.convert(keypoints)) / size).astype(int)
-        index = cell[:, 0] + self.settings.cells * cell[:, 1]
-        order = np.lexsort(([-keypoint.response for keypoint in keypoints], index))
-        starts = np.flatnonzero(np.diff(index[order], prepend=-1))
-        rank = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
-        best = order[np.argsort(rank, kind="stable")]
-        return [keypoints[k] for k in best[: self.settings.features]]
+        Parameters
+        ----------
+        image : array or None
+            As for :meth:`track`.
+        near : ndarray (4, 4), optional
+            Where the camera is thought to be; without it the whole map is searched.
 
-    def _initialise(self, features: Features) -> TrackedFrame:
-        """Wait for two views with enough parallax, then triangulate the first map between them."""
+        Returns
+        -------
+        TrackedFrame
+            With ``near`` (or the identity) as its pose if the camera was not found.
+        """
+        features = self._detector.detect(image)
+        frame, _ = (
+            self._relocalise(features) if near is None else self._locate(features, near, self.settings.gate)
+        )
+        return frame if frame.tracked else replace(frame, pose=np.eye(4) if near is None else near)
+
+    def _initialise(self, features: Features) -> bool:
+        """Triangulate the first map once two views have enough parallax; return whether there is one."""
         settings = self.settings
-        waiting = TrackedFrame(self._pose, False, len(features))
         if self._reference is None or len(self._reference) < settings.first_points:
             self._reference = features
-            return waiting
-        first, second = match_descriptors(self._reference, features, settings)
+            return False
+        first, second = match_descriptors(self._reference, features, settings.hamming)
         before, now = self._reference.pixels[first], features.pixels[second]
         if len(first) < settings.first_points:
-            return waiting
+            return False
         essential, mask = cv2.findEssentialMat(before, now, self.camera.matrix, cv2.RANSAC, 0.999, 1.0)
         if essential is None or essential.shape != (3, 3):
-            return waiting
+            return False
         count, rotation, translation, mask = cv2.recoverPose(
             essential, before, now, self.camera.matrix, mask=mask
         )
         if count < settings.first_points:
-            return waiting
-        world_in_camera = np.eye(4)
-        world_in_camera[:3, :3], world_in_camera[:3, 3] = rotation, translation[:, 0]
-        pose = invert_pose(world_in_camera)
+            return False
+        pose = _camera_pose(rotation, translation)
         inside = mask.ravel() > 0
         positions, angle = self._meet(np.eye(4), before[inside], pose, now[inside])
         if np.median(angle) < settings.first_parallax:
-            return waiting
+            return False
         pose[:3, 3] /= np.median(positions[:, 2])
-        nothing = np.full(len(self._reference), -1)
-        self.keyframes.append(Keyframe(np.eye(4), self._reference, nothing))
+        self.keyframes.append(Keyframe(np.eye(4), self._reference, np.full(len(self._reference), -1)))
         self._add_keyframe(pose, features, np.full(len(features), -1))
-        self._pose, self._motion = pose, np.eye(4)
-        return self._locate(features, pose, settings.gate)
+        return True
 
-    def _locate(self, features: Features, predicted: Array, gate: float) -> TrackedFrame:
-        """Track against the map points expected in view."""
+    def _locate(self, features: Features, predicted: Array, gate: float) -> tuple[TrackedFrame, Indices]:
+        """Locate the camera by the map points expected in view."""
         candidates, expected = self._visible(predicted)
+        descriptors = self.map.descriptors[candidates]
         chosen, matched = match_near(
-            expected, self.map.descriptors[candidates], features, gate, self.settings
+            expected, descriptors, features, gate, self.settings.hamming, self.settings.ratio
         )
-        points = candidates[chosen]
-        return self._solve(features, points, matched, self.settings.tracked_inliers, rounds=60)
+        return self._solve(features, candidates[chosen], matched, self.settings.tracked_inliers, rounds=60)
 
-    def _relocalise(self, features: Features) -> TrackedFrame:
-        """Search the whole map, without any idea where the camera is."""
+    def _relocalise(self, features: Features) -> tuple[TrackedFrame, Indices]:
+        """Locate the camera by the whole map, without any idea where it is."""
         everything = Features(self.map.positions, self.map.descriptors)
-        matched, points = match_descriptors(features, everything, self.settings)
+        matched, points = match_descriptors(features, everything, self.settings.hamming)
         return self._solve(features, points, matched, self.settings.relocalised_inliers, rounds=300)
 
     def _visible(self, pose: Array) -> tuple[Indices, Array]:
@@ -331,36 +316,27 @@ class MonocularTracker:
 
     def _solve(
         self, features: Features, points: Indices, matched: Indices, fewest: int, rounds: int
-    ) -> TrackedFrame:
-        """Solve perspective-n-point for the matches; keep the last pose if too few of them agree."""
+    ) -> tuple[TrackedFrame, Indices]:
+        """Solve perspective-n-point for the matches; also return the map point of every feature, or -1."""
         world, pixels = self.map.positions[points], features.pixels[matched]
         pose, inliers = self._perspective(world, pixels, rounds)
+        owner = np.full(len(features), -1)
+        counts = len(features), len(points), len(inliers)
         if pose is None or len(inliers) < fewest:
-            self._lost += 1
-            return TrackedFrame(
-                self._pose, False, len(features), len(points), len(inliers), other_pixels=features.pixels
-            )
+            return TrackedFrame(np.full((4, 4), np.nan), False, *counts, other_pixels=features.pixels), owner
+        owner[matched[inliers]] = points[inliers]
         error = self._reprojection(pose, world, pixels)
-        self._motion = np.eye(4) if self._lost else invert_pose(self._pose) @ pose
-        self._pose, self._lost = pose, 0
-        if self._is_new(pose, len(inliers)):
-            owner = np.full(len(features), -1)
-            owner[matched[inliers]] = points[inliers]
-            self._add_keyframe(pose, features, owner)
-        inside = np.zeros(len(features), dtype=bool)
-        inside[matched[inliers]] = True
-        return TrackedFrame(
-            self._pose,
+        frame = TrackedFrame(
+            pose,
             True,
-            len(features),
-            len(points),
-            len(inliers),
+            *counts,
             float(error[inliers].mean()),
             float(np.minimum(error, 10.0).mean()),
             self._spread(pose, world[inliers], error[inliers]),
-            features.pixels[inside],
-            features.pixels[~inside],
+            features.pixels[owner >= 0],
+            features.pixels[owner < 0],
         )
+        return frame, owner
 
     def _perspective(self, world: Array, pixels: Array, rounds: int) -> tuple[Array | None, Indices]:
         """Return the pose from points (n, 3) and pixels (n, 2) by RANSAC and refinement, and the inliers."""
@@ -383,9 +359,7 @@ class MonocularTracker:
             rotation, translation = cv2.solvePnPRefineLM(
                 world[inliers], pixels[inliers], self.camera.matrix, None, rotation, translation
             )
-            world_in_camera = np.eye(4)
-            world_in_camera[:3, :3], world_in_camera[:3, 3] = cv2.Rodrigues(rotation)[0], translation[:, 0]
-            pose = invert_pose(world_in_camera)
+            pose = _camera_pose(cv2.Rodrigues(rotation)[0], translation)
             inliers = np.flatnonzero(self._reprojection(pose, world, pixels) < self.settings.inlier_error)
             if len(inliers) < 6:
                 return None, inliers
@@ -405,14 +379,14 @@ class MonocularTracker:
         covariance = np.linalg.pinv(jacobian.T @ jacobian) * np.mean(error**2) / 2
         return float(np.sqrt(np.trace(covariance[:3, :3])))
 
-    def _is_new(self, pose: Array, inliers: int) -> bool:
+    def _is_new(self, frame: TrackedFrame) -> bool:
         """Return whether the view is good enough for a keyframe and shows enough that the others do not."""
-        if inliers < self.settings.keyframe_inliers:
+        if frame.inliers < self.settings.keyframe_inliers:
             return False
-        distances = [np.linalg.norm(keyframe.pose[:3, 3] - pose[:3, 3]) for keyframe in self.keyframes]
+        distances = [np.linalg.norm(keyframe.pose[:3, 3] - frame.pose[:3, 3]) for keyframe in self.keyframes]
         nearest = int(np.argmin(distances))
         known = np.count_nonzero(self.keyframes[nearest].points >= 0)
-        fewer = inliers < self.settings.keyframe_share * known
+        fewer = frame.inliers < self.settings.keyframe_share * known
         return bool(distances[nearest] > self.settings.keyframe_distance / (3 if fewer else 1))
 
     def _add_keyframe(self, pose: Array, features: Features, owner: Indices) -> None:
@@ -467,7 +441,7 @@ class MonocularTracker:
         a, b = match_descriptors(
             Features(new.features.pixels[mine], new.features.descriptors[mine]),
             Features(old.features.pixels[theirs], old.features.descriptors[theirs]),
-            self.settings,
+            self.settings.hamming,
         )
         mine, theirs = mine[a], theirs[b]
         here, there = new.features.pixels[mine], old.features.pixels[theirs]
@@ -501,64 +475,11 @@ class MonocularTracker:
         return (nearest + other_nearest) / 2, np.sqrt(sine_squared)
 
 
-def match_descriptors(
-    first: Features, second: Features, settings: TrackerSettings
-) -> tuple[Indices, Indices]:
-    """Return indices of features that are each other's best match, without any idea where they are."""
-    if len(first) < 2 or len(second) < 2:
-        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
-    matcher = cv2.BFMatcher(cv2.NORM_HAMMING, crossCheck=True)
-    matches = matcher.match(first.descriptors, second.descriptors)
-    pairs = np.array([(m.queryIdx, m.trainIdx) for m in matches if m.distance < settings.hamming])
-    pairs = pairs.reshape(-1, 2).astype(np.intp)
-    return pairs[:, 0], pairs[:, 1]
-
-
-def match_near(
-    expected: Array,
-    descriptors: NDArray[np.uint8],
-    features: Features,
-    gate: float,
-    settings: TrackerSettings,
-) -> tuple[Indices, Indices]:
-    """Match map points to features near their expected pixels.
-
-    Parameters
-    ----------
-    expected : ndarray (n, 2)
-        Where the points are expected [px].
-    descriptors : ndarray (n, 32)
-        Their descriptors, uint8.
-    features : Features
-        Features of the image.
-    gate : float
-        Search radius [px].
-    settings : TrackerSettings
-        Largest Hamming distance, and the ratio to the second best.
-
-    Returns
-    -------
-    points, features : ndarray (m,) of int
-        Indices of the matches; every feature at most once.
-    """
-    nothing = np.zeros(0, dtype=np.intp)
-    if not len(expected) or not len(features):
-        return nothing, nothing
-    pairs = cKDTree(expected).sparse_distance_matrix(cKDTree(features.pixels), gate, output_type="ndarray")
-    point, feature = pairs["i"], pairs["j"]
-    mine = np.ascontiguousarray(descriptors).view(np.uint64)[point]
-    theirs = np.ascontiguousarray(features.descriptors).view(np.uint64)[feature]
-    bits = np.bitwise_count(mine ^ theirs).sum(axis=1, dtype=np.int32)
-    order = np.lexsort((bits, point))
-    point, feature, bits = point[order], feature[order], bits[order]
-    first = np.flatnonzero(np.diff(point, prepend=-1))
-    second = np.minimum(first + 1, len(point) - 1)
-    rival = np.where((second > first) & (point[second] == point[first]), bits[second], 256)
-    good = first[(bits[first] < settings.hamming) & (bits[first] < settings.ratio * rival)]
-    good = good[np.argsort(bits[good], kind="stable")]
-    _, unique = np.unique(feature[good], return_index=True)
-    good = good[unique]
-    return point[good], feature[good]
+def _camera_pose(rotation: ArrayLike, translation: ArrayLike) -> Array:
+    """Return ``camera_in_map`` (4, 4) from the rotation and translation (3, 1) of the map in the camera."""
+    world_in_camera = np.eye(4)
+    world_in_camera[:3, :3], world_in_camera[:3, 3:] = rotation, translation
+    return invert_pose(world_in_camera)
 
 
 def fit_similarity(measured: ArrayLike, reference: ArrayLike) -> tuple[Array, float, Array]:

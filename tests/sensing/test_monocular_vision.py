@@ -6,15 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from soro_lib.sensing.feature_matching import Features, match_descriptors, match_near
 from soro_lib.sensing.monocular_scene import ENDOSCOPE, BrickScene, ViewConditions, photograph
-from soro_lib.sensing.monocular_vision import (
-    Features,
-    MonocularTracker,
-    TrackerSettings,
-    fit_similarity,
-    match_descriptors,
-    match_near,
-)
+from soro_lib.sensing.monocular_vision import MonocularTracker, TrackerSettings, fit_similarity
 from soro_lib.studies.visual_strain_fusion.camera_runs import metric_pose, start_tracker
 from soro_lib.studies.visual_strain_fusion.motion import move
 
@@ -36,7 +30,7 @@ def tracker(started):
     import copy
 
     original, similarity = started
-    state = {name: value for name, value in vars(original).items() if name != "_orb"}
+    state = {name: value for name, value in vars(original).items() if name != "_detector"}
     clone = MonocularTracker(ENDOSCOPE)
     vars(clone).update(copy.deepcopy(state))
     return clone, similarity
@@ -218,13 +212,13 @@ def test_matching_stays_in_the_gate_and_uses_a_feature_once():
     descriptors = rng.integers(0, 256, (50, 32), dtype=np.uint8)
     pixels = rng.uniform(0, 400, (50, 2))
     image = Features(pixels, descriptors)
-    point, feature = match_near(pixels + 3.0, descriptors, image, 10.0, TrackerSettings())
+    point, feature = match_near(pixels + 3.0, descriptors, image, 10.0, 60, 0.9)
     np.testing.assert_array_equal(np.sort(point), np.arange(50))
     np.testing.assert_array_equal(point, feature)
-    assert len(match_near(pixels + 30.0, descriptors, image, 10.0, TrackerSettings())[0]) < 3
+    assert len(match_near(pixels + 30.0, descriptors, image, 10.0, 60, 0.9)[0]) < 3
     twice = np.vstack([descriptors, descriptors])
-    point, feature = match_near(np.vstack([pixels, pixels]), twice, image, 10.0, TrackerSettings())
+    point, feature = match_near(np.vstack([pixels, pixels]), twice, image, 10.0, 60, 0.9)
     assert len(np.unique(feature)) == len(feature) == 50
     none = Features(np.zeros((0, 2)), np.zeros((0, 32), np.uint8))
-    assert len(match_near(pixels, descriptors, none, 10.0, TrackerSettings())[0]) == 0
-    assert len(match_descriptors(none, image, TrackerSettings())[0]) == 0
+    assert len(match_near(pixels, descriptors, none, 10.0, 60, 0.9)[0]) == 0
+    assert len(match_descriptors(none, image, 60)[0]) == 0
