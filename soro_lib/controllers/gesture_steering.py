@@ -300,7 +300,8 @@ class GestureSteering:
             mid_step = self._locked_mid - pose.mid
             problem = locked_step(pose, position_step, mid_step, direction_step, bounds, settings.weights)
         elif settings.obstacles:
-            near = clearances(self.robot, self.actuation, settings.obstacles)
+            avoiding = settings.weights.avoidance > 0 or settings.margin is not None
+            near = clearances(self.robot, self.actuation, settings.obstacles) if avoiding else []
             problem = avoiding_step(pose, position_step, near, bounds, settings.weights, settings.margin)
         else:
             problem = pose_step(pose, position_step, direction_step, bounds, settings.weights)
@@ -310,7 +311,7 @@ class GestureSteering:
         """Take the step, shortened until the tip keeps its speed limit whatever the curvature of the model."""
         limit = self.settings.tip_speed * interval
         for _ in range(10):
-            actuation = np.clip(self.actuation + actuation_step, self._lower, self._upper)
+            actuation = np.minimum(np.maximum(self.actuation + actuation_step, self._lower), self._upper)
             pose = self._kinematics(actuation)
             moved = math.dist(pose.tip, self.pose.tip)
             if moved <= limit * (1 + 1e-9):

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import daqp
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.robots.cable_driven_kernels import Kinematics
@@ -89,43 +90,41 @@ class StepBounds(NamedTuple):
     units: Array = CABLE_UNITS
 
 
-@dataclass(frozen=True, eq=False)
-class StepProblem:
-    """Minimise ``|rows step - right|^2 + |damping * step|^2`` within bounds; millimetres and newtons.
+class StepProblem(NamedTuple):
+    """Minimise ``step' hessian step / 2 + gradient' step`` within bounds; in the units of the solver.
 
     Attributes
     ----------
-    rows : ndarray (m, n)
-        Linearised residuals.
-    right : ndarray (m,)
-        What they shall become.
-    damping : ndarray (n,)
-        Weight of each actuator's own motion.
+    hessian : ndarray (n, n)
+        Of the sum of squares, halved.
+    gradient : ndarray (n,)
+        At a step of zero, halved.
     lower, upper : ndarray (n,)
         Bounds of the step.
+    finite : bool
+        Whether every number above is one.
     units : ndarray (n,)
         SI value of one unit of each actuator.
     matrix, bound : ndarray (k, n), (k,)
         Inequalities ``matrix @ step <= bound``.
     """
 
-    rows: Array
-    right: Array
-    damping: Array
+    hessian: Array
+    gradient: Array
     lower: Array
     upper: Array
+    finite: bool
     units: Array
     matrix: Array
     bound: Array
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(NamedTuple):
     """Result of one step.
 
     Attributes
     ----------
-    actuation_step : ndarray (7,)
+    actuation_step : ndarray (n,)
         Change of the actuation [m, then N]; zero when not converged.
     converged : bool
         Whether the solver found the optimum.
@@ -183,7 +182,7 @@ def pose_step(
     """
     position = (kinematics.tip_jacobian, position_step, 1 / MILLIMETRE)
     direction = (kinematics.direction_jacobian, direction_step, weights.direction)
-    return _problem((position, direction), bounds, weights)
+    return _problem(position, direction, bounds, weights)
 
 
 def locked_step(
@@ -200,9 +199,11 @@ def locked_step(
     """
     position = (kinematics.tip_jacobian, position_step, 1 / MILLIMETRE)
     mid_position = (kinematics.mid_jacobian, mid_step, weights.mid_point / MILLIMETRE)
-    direction = (kinematics.direction_jacobian, direction_step, weights.locked_direction)
-    blocks = (position, mid_position, direction) if weights.locked_direction > 0 else (position, mid_position)
-    return _problem(blocks, bounds, weights)
+    problem = _problem(position, mid_position, bounds, weights)
+    if weights.locked_direction > 0:
+        direction = (kinematics.direction_jacobian, direction_step, weights.locked_direction)
+        _add_squares(problem.hessian, problem.gradient, *direction, bounds.units)
+    return problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,18 +244,19 @@ def avoiding_step(
     margin : float, optional
         If given, every clearance must stay above this [m]: a linear inequality, which (29) does not have.
     """
-    blocks = [(kinematics.tip_jacobian, position_step, 1 / MILLIMETRE)]
+    position = (kinematics.tip_jacobian, position_step, 1 / MILLIMETRE)
+    avoidance = (_no_rows(len(bounds.units)), _NOTHING, 0.0)
     if weights.avoidance > 0 and clearances:
         nearest = clearances[0]
         ratio = nearest.contact / nearest.distance
         slope = -ratio / nearest.distance * nearest.gradient
-        blocks.append((slope[None], np.array([-ratio]), math.sqrt(weights.avoidance)))
-    problem = _problem(blocks, bounds, weights)
+        avoidance = (slope[None], np.array([-ratio]), math.sqrt(weights.avoidance))
+    problem = _problem(position, avoidance, bounds, weights)
     if margin is None or not clearances:
         return problem
     approach = np.array([-item.gradient for item in clearances]) * bounds.units / MILLIMETRE
     room = np.array([item.distance - item.contact - margin for item in clearances]) / MILLIMETRE
-    return replace(problem, matrix=approach, bound=room)
+    return problem._replace(matrix=approach, bound=room)
 
 
 def step_bound_as_printed(actuators: int = 7) -> tuple[Array, Array]:
@@ -266,15 +268,15 @@ def step_bound_as_printed(actuators: int = 7) -> tuple[Array, Array]:
     return np.diag([1e-3] + [1.0] * (actuators - 1)), np.full(actuators, 1e-2)
 
 
-def _problem(
-    blocks: Sequence[tuple[Array, Array, float]], bounds: StepBounds, weights: StepWeights
-) -> StepProblem:
-    """Stack weighted blocks (Jacobian, wanted change, weight) and change to the units of the solver."""
+Squares = tuple[Array, Array, float]
+"""A sum of squares ``weight^2 |jacobian step - wanted|^2``: (jacobian, wanted, weight), SI."""
+
+
+def _problem(first: Squares, second: Squares, bounds: StepBounds, weights: StepWeights) -> StepProblem:
+    """Add two sums of squares and the damping, in the units of the solver."""
     lower, upper, units = bounds
-    rows = np.concatenate([jacobian * weight for jacobian, _, weight in blocks]) * units
-    right = np.concatenate([wanted * weight for _, wanted, weight in blocks])
-    damping = np.where(units == MILLIMETRE, weights.slide_damping, weights.damping)
-    return StepProblem(rows, right, damping, lower / units, upper / units, units, _no_rows(len(units)), _NOTHING)
+    assembled = _normal_equations(*first, *second, weights.damping, weights.slide_damping, units, lower, upper)
+    return StepProblem(*assembled, units, _no_rows(len(units)), _NOTHING)
 
 
 _NOTHING = np.zeros(0)
@@ -283,6 +285,37 @@ _NOTHING = np.zeros(0)
 @cache
 def _no_rows(actuators: int) -> Array:
     return np.zeros((0, actuators))
+
+
+@cache
+def _inequalities(rows: int) -> NDArray[np.intc]:
+    return np.zeros(rows, dtype=np.intc)
+
+
+@njit(cache=True)
+def _add_squares(hessian, gradient, jacobian, wanted, weight, units):  # type: ignore[no-untyped-def]
+    for row in range(len(wanted)):
+        for i in range(len(units)):
+            entry = weight * weight * jacobian[row, i] * units[i]
+            gradient[i] -= entry * wanted[row]
+            for j in range(len(units)):
+                hessian[i, j] += entry * jacobian[row, j] * units[j]
+
+
+@njit(cache=True)
+def _normal_equations(  # type: ignore[no-untyped-def]
+    first, wanted1, weight1, second, wanted2, weight2, damping, slide_damping, units, lower, upper
+):
+    """Return hessian, gradient, lower and upper bounds in the solver's units, and whether all are finite."""
+    actuators = len(units)
+    hessian, gradient = np.zeros((actuators, actuators)), np.zeros(actuators)
+    _add_squares(hessian, gradient, first, wanted1, weight1, units)
+    _add_squares(hessian, gradient, second, wanted2, weight2, units)
+    for i in range(actuators):
+        hessian[i, i] += (slide_damping if units[i] == MILLIMETRE else damping) ** 2
+    low, high = lower / units, upper / units
+    finite = np.isfinite(hessian.sum() + gradient.sum() + low.sum() + high.sum())
+    return hessian, gradient, low, high, finite
 
 
 # --- solving -----------------------------------------------------------------------------------------------
@@ -296,21 +329,17 @@ def solve(problem: StepProblem) -> Step:
     Step
         With ``converged`` False and a zero step when the bounds contradict each other or the solver gives up.
     """
-    hessian = problem.rows.T @ problem.rows
-    hessian.ravel()[:: len(hessian) + 1] += np.square(problem.damping)
-    gradient = -(problem.right @ problem.rows)
-    upper, lower = problem.upper, problem.lower
-    if len(problem.bound):
-        upper = np.concatenate([upper, problem.bound])
-        lower = np.concatenate([lower, np.full(len(problem.bound), -1e30)])
-    if not math.isfinite(gradient.sum() + hessian.sum()):
+    hessian, gradient, lower, upper, finite, units, matrix, bound = problem
+    if not finite:
         return Step(np.zeros(len(gradient)), False, "the problem is not finite")
-    sense = np.zeros(len(upper), dtype=np.intc)
-    step, _, flag, _ = daqp.solve(hessian, gradient, problem.matrix, upper, lower, sense)
+    if len(bound):
+        upper = np.concatenate([upper, bound])
+        lower = np.concatenate([lower, np.full(len(bound), -1e30)])
+    step, _, flag, _ = daqp.solve(hessian, gradient, matrix, upper, lower, _inequalities(len(upper)))
     if flag < 1:
         reason = "the bounds contradict each other" if flag == -1 else f"daqp stopped with flag {flag}"
         return Step(np.zeros(len(gradient)), False, reason)
-    return Step(step * problem.units, True)
+    return Step(step * units, True)
 
 
 class ReadableStep:

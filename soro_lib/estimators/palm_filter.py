@@ -268,6 +268,13 @@ class DirectionFilter:
         Of a small turn [s].
     range_ratio : float
         h_RL / b_low: how much faster a half turn is taken over than a small one [-].
+
+    Attributes
+    ----------
+    direction : ndarray (3,)
+        Filtered unit direction.
+    quaternion : ndarray (4,)
+        The same as a twist-free quaternion (w, x, y, z).
     """
 
     def __init__(self, time_constant: float = 0.1, range_ratio: float = 2.0) -> None:
@@ -275,16 +282,12 @@ class DirectionFilter:
             raise ValueError(f"DirectionFilter.time_constant = {time_constant}, must be finite and > 0")
         self.time_constant = time_constant
         self.range_ratio = range_ratio
-        self.quaternion = np.array([1.0, 0.0, 0.0, 0.0])
-
-    @property
-    def direction(self) -> Array:
-        """Filtered unit direction (3,)."""
-        return quaternion_direction(self.quaternion)
+        self.reset((0.0, 0.0, 1.0))
 
     def reset(self, direction: ArrayLike) -> None:
         """Start anew from a unit direction (3,)."""
         self.quaternion = direction_quaternion(direction)
+        self.direction = quaternion_direction(self.quaternion)
 
     def update(self, interval: float, direction: ArrayLike) -> Array:
         """Turn towards the unit vector ``direction`` (3,) for ``interval`` [s] and return the result (3,)."""
@@ -293,4 +296,5 @@ class DirectionFilter:
         distance = angular_distance(self.quaternion, target)
         share = low_pass_share(distance, self.range_ratio * low_pass, low_pass)
         self.quaternion = slerp(self.quaternion, target, share)
+        self.direction = quaternion_direction(self.quaternion)
         return self.direction

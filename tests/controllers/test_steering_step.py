@@ -1,7 +1,5 @@
 """One step of the inverse kinematics: the fast path against the readable one, limits, and the errata."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -64,7 +62,7 @@ def test_step_is_the_minimum():
         problem = pose_step(pose, position, direction, bounds, weights)
 
         def cost(step, problem=problem):
-            return np.sum((problem.rows @ step - problem.right) ** 2) + np.sum((problem.damping * step) ** 2)
+            return step @ problem.hessian @ step / 2 + problem.gradient @ step
 
         found = solve(problem).actuation_step / [1e-3, *[1.0] * 6]
         brute = minimize(cost, np.zeros(7), bounds=list(zip(problem.lower, problem.upper)), tol=1e-14)
@@ -134,7 +132,7 @@ def test_printed_step_bound_ratchets():
             pose, *wanted, StepBounds(ARM.lower - actuation, ARM.upper - actuation), StepWeights()
         )
         if printed:
-            problem = replace(problem, matrix=matrix, bound=bound)
+            problem = problem._replace(matrix=matrix, bound=bound)
         return np.clip(actuation + solve(problem).actuation_step, ARM.lower, ARM.upper)
 
     assert errors(False).max() < 0.2e-3
@@ -184,7 +182,7 @@ def test_avoidance_is_the_linearised_cost():
         position = (KINEMATICS(after).tip - pose.tip - wanted) * 1e3
         return position @ position + eta * (near[0].contact / distance) ** 2 + step[1:] @ step[1:]
 
-    gradient = -2 * problem.right @ problem.rows
+    gradient = 2 * problem.gradient
     for column in range(7):
         nudge = np.zeros(7)
         nudge[column] = 1e-5

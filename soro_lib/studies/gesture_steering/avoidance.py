@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from soro_lib.sensing.hand_tracking import HandSample, hand_samples
 from soro_lib.studies.gesture_steering.steering import (
     CONTROL_PERIOD,
     HIGH_REACH,
+    LEAD,
     at_interval,
     commanding_hand,
     result_table,
@@ -81,7 +83,7 @@ def crossed(rng: np.random.Generator, line: str, policy: str, duration: float = 
     table = commanding_hand(rng, duration, path, straight, mapping=settings.mapping)
     steering = _beside_the_obstacle(arm, settings, start)
     results = [steering.update(sample) for sample in at_interval(hand_samples(table), CONTROL_PERIOD)]
-    found = result_table(results)
+    found = result_table(results, LEAD)
     for axis in "xyz":
         found[f"deviation_{axis}_mm"] = found[f"tip_{axis}_mm"] - found[f"target_{axis}_mm"]
     actuations = np.array([result.actuation for result in results])
@@ -90,7 +92,9 @@ def crossed(rng: np.random.Generator, line: str, policy: str, duration: float = 
     return found.query("time_s >= 0").reset_index(drop=True)
 
 
-def avoidance_table(seed: int, seeds: int = 3) -> tuple[pd.DataFrame, pd.DataFrame]:
+def avoidance_table(
+    seed: int, seeds: int = 3, lines: Sequence[str] = tuple(LINES)
+) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Try every policy on every line.
 
     Returns
@@ -103,7 +107,7 @@ def avoidance_table(seed: int, seeds: int = 3) -> tuple[pd.DataFrame, pd.DataFra
     """
     runs = []
     for index, child in enumerate(np.random.SeedSequence(seed).spawn(seeds)):
-        for line in LINES:
+        for line in lines:
             for policy in POLICIES:
                 runs.append(crossed(np.random.default_rng(child), line, policy).assign(seed=index))
     table = pd.concat(runs, ignore_index=True)

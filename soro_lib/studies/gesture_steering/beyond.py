@@ -232,7 +232,7 @@ def delay_against_rate(rng_seed: np.random.SeedSequence, rates: tuple[float, ...
         *((f"{rate:.0f} Hz", 1.0 / rate if rate < 100 else 0.0, 0.0) for rate in rates),
         ("servo bus", bus.period, bus.period),
     ):
-        commands = steering.result_table(steering.steered(table, interval=interval))
+        commands = steering.result_table(steering.steered(table, interval=interval), steering.LEAD)
         applied = commands["time_s"].to_numpy() + busy
         fine = np.arange(1.0, 15.0, 0.001)
         held = np.searchsorted(applied, fine, side="right") - 1

@@ -15,7 +15,7 @@ from soro_lib.robots.cable_driven_kernels import compiled_kinematics
 from soro_lib.robots.cable_driven_plant import Prototype, PrototypeRanges, drawn_prototype, pointing_angle
 from soro_lib.sensing.synthetic_hand import HandNoise
 from soro_lib.studies.gesture_steering.hands import HOVER, hover_recording
-from soro_lib.studies.gesture_steering.steering import CONTROL_PERIOD, commanding_hand, result_table, steered
+from soro_lib.studies.gesture_steering.steering import CONTROL_PERIOD, LEAD, commanding_hand, result_table, steered
 
 Array = NDArray[np.float64]
 
@@ -201,7 +201,7 @@ def fig10_commands(seed: int = 1) -> dict[str, pd.DataFrame]:
         ("d", _rising_arc, _swaying, streams[2]),
     ):
         table = commanding_hand(stream, 12.0, path, direction, noise=HandNoise())
-        panels[panel] = result_table(steered(table, settings, interval=CONTROL_PERIOD)).query("time_s >= 0")
+        panels[panel] = result_table(steered(table, settings, interval=CONTROL_PERIOD), LEAD).query("time_s >= 0")
     return panels
 
 

@@ -117,19 +117,26 @@ def steered(
     return replay(GestureSteering(arm or CableDrivenArm(), settings), samples)
 
 
-def result_table(results: Sequence[SteeringResult]) -> pd.DataFrame:
+def result_table(results: Sequence[SteeringResult], lead: float = 0.0) -> pd.DataFrame:
     """Turn results into a tidy table.
+
+    Parameters
+    ----------
+    results : sequence of SteeringResult
+        In time order.
+    lead : float
+        Time before zero [s].
 
     Returns
     -------
     DataFrame
-        ``time_s`` from the end of the lead; ``tip_*_mm``, ``target_*_mm``, ``goal_*_mm``; ``alpha_deg``,
+        ``time_s``; ``tip_*_mm``, ``target_*_mm``, ``goal_*_mm``; ``alpha_deg``,
         ``gamma_deg``: tilt of the tip towards +x and +y, and of the target (``target_alpha_deg``, ...);
         ``position_error_mm``, ``direction_error_deg``; ``mode``, ``reason``; ``slide_mm`` and ``cable_1`` to
         ``cable_6`` (-N).
     """
     time = np.array([result.time for result in results])
-    columns: dict[str, ArrayLike] = {"time_s": time - time[0] - LEAD}
+    columns: dict[str, ArrayLike] = {"time_s": time - time[0] - lead}
     for name, rows in (
         ("tip", [result.tip for result in results]),
         ("mid", [result.mid for result in results]),
@@ -212,7 +219,7 @@ def fig7a(rng: np.random.Generator, settings: SteeringSettings | None = None, in
           noise: HandNoise | None = None, duration: float = 16.0) -> pd.DataFrame:  # fmt: skip
     """Steer the tip along the infinity path with a flat palm; evaluated from time 0 on."""
     table = commanding_hand(rng, duration, infinity_path, straight, noise=noise)
-    return result_table(steered(table, settings, interval=interval)).query("time_s >= 0")
+    return result_table(steered(table, settings, interval=interval), LEAD).query("time_s >= 0")
 
 
 def fig7b(rng: np.random.Generator, settings: SteeringSettings | None = None, interval: float = CONTROL_PERIOD,
@@ -225,7 +232,7 @@ def fig7b(rng: np.random.Generator, settings: SteeringSettings | None = None, in
         lambda time: cone(time, opening),
         mapping=HIGH_REACH, noise=noise,
     )  # fmt: skip
-    return result_table(steered(table, settings, interval=interval)).query("time_s >= 0")
+    return result_table(steered(table, settings, interval=interval), LEAD).query("time_s >= 0")
 
 
 # --- Fig. 8 ------------------------------------------------------------------------------------------------
@@ -251,7 +258,7 @@ def fig8(rng: np.random.Generator, panel: str, settings: SteeringSettings | None
         return np.tile([0.010, -0.008, 0.115], (len(time), 1))
 
     table = commanding_hand(rng, 12.0, position, direction, FIG8_SCRIPTS[panel], noise=noise)
-    return result_table(steered(table, settings, interval=interval)).query("time_s >= 0")
+    return result_table(steered(table, settings, interval=interval), LEAD).query("time_s >= 0")
 
 
 def direction_steps(table: pd.DataFrame, per: float = CONTROL_PERIOD) -> Array:

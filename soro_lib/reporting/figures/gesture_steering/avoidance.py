@@ -36,7 +36,7 @@ def fig14_obstacle(runs: pd.DataFrame, line: str, obstacle: Sphere) -> Figure:
             draw_arm(scene, arm, table[cables].to_numpy()[row] * [1e-3, *[1.0] * 6], strength=0.5)
         scene.plot_wireframe(*_ball(obstacle), color=COLORS["vermillion"], linewidth=0.4)
         equal_aspect(scene, [[-30, -30, 20], [30, 30, 140]], margin=0.0)
-        scene.set_box_aspect((60, 60, 120), zoom=1.45)
+        scene.set_box_aspect((60, 60, 120), zoom=1.3)
         scene.tick_params(labelsize=5, pad=-3)
         scene.view_init(elev=15, azim=-65)
         scene.set_title(policy, fontsize=9)

@@ -53,21 +53,22 @@ def stream_timing(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def palm_before_after(timeline: pd.DataFrame, zoom: tuple[float, float]) -> Figure:
-    """Draw the palm position before and after the filter, whole and in a short window [s]."""
-    figure, axes = new_figure(PAGE_WIDTH, 4.4, rows=3, columns=2, width_ratios=(1.7, 1), sharex="col")
-    close = timeline[timeline["time_s"].between(*zoom)]
+def palm_before_after(timeline: pd.DataFrame) -> Figure:
+    """Draw the palm position before and after the filter, and what the filter removed."""
+    figure, axes = new_figure(PAGE_WIDTH, 4.4, rows=3, columns=2, width_ratios=(1.5, 1), sharex=True)
     for row, axis in enumerate("xyz"):
-        for panel, data in ((axes[row, 0], timeline), (axes[row, 1], close)):
-            panel.plot(data["time_s"], data[f"raw_{axis}_mm"], **MEASUREMENT, label="tracker")
-            panel.plot(data["time_s"], data[f"filtered_{axis}_mm"], **ESTIMATE, label="Kalman filter")
+        raw, filtered = timeline[f"raw_{axis}_mm"], timeline[f"filtered_{axis}_mm"]
+        axes[row, 0].plot(timeline["time_s"], raw, **MEASUREMENT, label="tracker")
+        axes[row, 0].plot(timeline["time_s"], filtered, **{**ESTIMATE, "linewidth": 1.0}, label="Kalman filter")
         shade_modes(axes[row, 0], timeline["time_s"], timeline["mode"])
+        axes[row, 1].plot(timeline["time_s"], raw - filtered, **{**MEASUREMENT, "markersize": 1.5})
+        axes[row, 1].set_ylim(-2.0, 2.0)
         label_axes(axes[row, 0], y=f"palm {axis} [mm]")
     for panel in axes[2]:
         label_axes(panel, "time [s]")
     label_axes(axes[0, 0], title="Palm over the device")
-    label_axes(axes[0, 1], title="close up")
-    legend(axes[0, 1])
+    label_axes(axes[0, 1], title="tracker minus filter [mm]")
+    legend(axes[0, 0], ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.97), borderaxespad=0.0)
     return figure
 
 

@@ -60,7 +60,7 @@ def fig10_hover_and_paths(measured: pd.DataFrame) -> Figure:
 def fig11_configurations(actuations: list[Array], sim: Array, exp: Array) -> Figure:
     """Draw the four configurations of Table II: model, printed simulation (crosses) and experiment (dots) [mm]."""
     arm = CableDrivenArm()
-    figure, axes = new_figure(PAGE_WIDTH, 3.6, columns=4, projection="3d")
+    figure, axes = new_figure(PAGE_WIDTH, 4.4, columns=4, projection="3d")
     for index, panel in enumerate(axes):
         draw_arm(panel, arm, actuations[index], strength=0.7)
         panel.scatter(
@@ -69,8 +69,8 @@ def fig11_configurations(actuations: list[Array], sim: Array, exp: Array) -> Fig
         panel.scatter(
             *exp[index].T * 1e3, color=COLORS["black"], marker="o", s=12, depthshade=False, label="exp."
         )
-        equal_aspect(panel, [[-14, -14, 20], [14, 14, 155]], margin=0.0)
-        panel.set_box_aspect((1, 1, 2.6), zoom=1.45)
+        equal_aspect(panel, [[-14, -14, 30], [14, 14, 160]], margin=0.0)
+        panel.set_box_aspect((1, 1, 3.0), zoom=1.12)
         panel.set_title(f"Config. {index}", fontsize=9)
         panel.tick_params(labelsize=6, pad=-2)
         panel.set_xticks([-10, 0, 10])

@@ -47,7 +47,7 @@ def fig06_gesture_poses(poses: Sequence[tuple[str, Any]]) -> Figure:
         tip, direction = result.tip * 1e3, result.direction
         panel.quiver(*tip, *(25 * direction), color=COLORS["vermillion"], linewidth=1.5)
         equal_aspect(panel, [[-28, -28, 0], [28, 28, 140]], margin=0.0)
-        panel.set_box_aspect((56, 56, 140), zoom=1.3)
+        panel.set_box_aspect((56, 56, 140), zoom=1.12)
         panel.set_title(f"({'abcdef'[index]}) {name}", fontsize=9)
         panel.set_zlabel("z [mm]", fontsize=7)
         panel.tick_params(labelsize=6, pad=-2)
@@ -80,7 +80,7 @@ def fig07b_rotation(table: pd.DataFrame) -> Figure:
         draw_arm(left, arm, actuation, strength=0.5)
     left.scatter(-15, -20, 140, color=COLORS["vermillion"], marker="x", s=40, zorder=10)
     equal_aspect(left, [[-35, -40, 0], [20, 15, 150]], margin=0.0)
-    left.set_box_aspect((55, 55, 150), zoom=1.3)
+    left.set_box_aspect((55, 55, 150), zoom=1.05)
     left.tick_params(labelsize=6, pad=-2)
     left.view_init(elev=20, azim=-50)
     label_axes(left, title="Turning about a fixed point")
