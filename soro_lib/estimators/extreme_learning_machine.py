@@ -27,6 +27,10 @@ class UpdateResult:
 
     Attributes
     ----------
+    prediction : ndarray (7,)
+        Pose predicted before the sample was learned, with a unit quaternion [m, -].
+    variance : float
+        Variance of each component of its position [m^2].
     prior_error : ndarray (7,)
         Label minus prediction before the sample was learned: the honest prediction error [m, -].
     posterior_error : ndarray (7,)
@@ -37,6 +41,8 @@ class UpdateResult:
         Why the sample was refused; empty if it was accepted.
     """
 
+    prediction: Array
+    variance: float
     prior_error: Array
     posterior_error: Array
     accepted: bool
@@ -243,8 +249,7 @@ class ExtremeLearningMachine:
         label residual.
         """
         hidden = self.hidden_output(shift)
-        spread = hidden @ dsymv(1.0, self._covariance, hidden, lower=1)
-        return self._pose(hidden @ self.weights), self.label_variance * (1.0 + max(float(spread), 0.0))
+        return self._predict_row(hidden, float(hidden @ dsymv(1.0, self._covariance, hidden, lower=1)))
 
     def update(self, shift: ArrayLike, pose: ArrayLike) -> UpdateResult:
         """Learn one sample (Eqs. (10)-(17) in their corrected, cumulative form; Errata VS-2, VS-3).
@@ -262,21 +267,22 @@ class ExtremeLearningMachine:
             Errors before and after learning; a label that is not finite, or a covariance that lost its
             positive definiteness, is refused and leaves the network as it was.
         """
-        hidden = self.hidden_output(shift)
-        raw = hidden @ self.weights
         label = np.asarray(pose, dtype=float)
         if label.shape != (POSE_SIZE,):
             raise ValueError(f"pose must be ({POSE_SIZE},), got {label.shape}")
-        if not np.isfinite(label).all():
-            unknown = np.full(POSE_SIZE, np.nan)
-            return UpdateResult(unknown, unknown, False, "label not finite")
+        hidden = self.hidden_output(shift)
+        raw = hidden @ self.weights
+        direction = dsymv(1.0, self._covariance, hidden, lower=1)
+        spread = float(hidden @ direction)
+        prediction, variance = self._predict_row(hidden, spread)
         if label[3:] @ raw[3:] < 0.0:
             label = np.concatenate([label[:3], -label[3:]])
         innovation = label - raw
-        direction = dsymv(1.0, self._covariance, hidden, lower=1)
-        spread = float(hidden @ direction)
+        if not np.isfinite(innovation).all():
+            return UpdateResult(prediction, variance, innovation, innovation, False, "label not finite")
         if not 0.0 <= spread < np.inf:
-            return UpdateResult(innovation, innovation, False, "covariance not positive definite")
+            reason = "covariance not positive definite"
+            return UpdateResult(prediction, variance, innovation, innovation, False, reason)
         forgetting = self.forgetting if self.trace <= self.forgetting * self.maximum_trace else 1.0
         scale = 1.0 / (forgetting + spread)
         self.weights += np.multiply.outer(scale * direction, innovation)
@@ -285,7 +291,11 @@ class ExtremeLearningMachine:
             self._covariance /= forgetting
         residual = innovation * (forgetting * scale)
         self.label_variance += 0.005 * (float(innovation[:3] @ residual[:3]) / 3.0 - self.label_variance)
-        return UpdateResult(innovation, residual, True)
+        return UpdateResult(prediction, variance, innovation, residual, True)
+
+    def _predict_row(self, hidden: Array, spread: float) -> tuple[Array, float]:
+        variance = self.label_variance * (1.0 + max(spread, 0.0))
+        return self._pose(hidden @ self.weights), variance
 
     @staticmethod
     def _pose(raw: Array) -> Array:

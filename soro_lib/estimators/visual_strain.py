@@ -160,12 +160,13 @@ class VisualStrainEstimator:
         if not self.network.is_fitted:
             return self._collect(shift, error, learnable, masked)
         variance, posterior, note = np.inf, np.nan, ""
-        if whole:
-            self._fibre_pose, variance = self.network.predict_with_variance(shift)
         if learnable:
             result = self.network.update(shift, self._camera_pose)
+            self._fibre_pose, variance = result.prediction, result.variance
             learnable, note = result.accepted, result.reason
             posterior = float(np.sqrt(result.posterior_error[:3] @ result.posterior_error[:3]))
+        elif whole:
+            self._fibre_pose, variance = self.network.predict_with_variance(shift)
         pose = fuse_poses(
             self._camera_pose, self._fibre_pose, error, lower=self.settings.lower, upper=self.settings.upper
         )

@@ -101,7 +101,7 @@ def fit_actuation_map(
     chambers : ChamberParameters
         The plant that is swept.
     lowest, highest : float
-        Ends of the sweep of the steppers about rest [m].
+        Ends of the sweep of the steppers about rest [m]; what meets the limits of the arm is left out.
     """
     arm = PneumaticArm()
     commands = np.linspace(lowest, highest, 281)
@@ -114,7 +114,8 @@ def fit_actuation_map(
     up = np.array(elongations[100:381])
     down = np.array(elongations[381:])[::-1]
     lengths = np.maximum.accumulate(0.5 * (up + down)) + 1e-9 * np.arange(len(commands))
-    return ActuationMap(arm.home[0] + commands, lengths)
+    inside = (lengths > arm.lower[0]) & (lengths < arm.upper[0])
+    return ActuationMap(arm.home[0] + commands[inside], lengths[inside])
 
 
 def follow_curve(

@@ -105,7 +105,7 @@ def compare_controllers(
     arm = PneumaticArm()
     robots = PneumaticPlant(arm, _vary(plant.chambers, seeds, spread, rng), batch=batch)
     # The compensators see the last steps of the model-based cycles, which is all that their windows hold.
-    shared = len(targets) - max(settings.window for settings in readings.values()) - 1
+    shared = len(targets) - max((settings.window + 1 for settings in readings.values()), default=0)
     first = track(
         robots,
         HybridController(arm, base, batch),
@@ -114,14 +114,14 @@ def compare_controllers(
         rng=rng,
         noise=noise,
     )
-    compensated = {}
+    compensated, last = {}, None
     for name, reading in readings.items():
         settings = replace(reading, proportional_gain=base.proportional_gain, maximum_step=maximum_step)
         controller, body, chance = HybridController(arm, settings, batch), deepcopy(robots), deepcopy(rng)
         last = track(body, controller, targets[shared:], compensating=False, rng=chance, noise=noise)
         compensated[name] = track(body, controller, targets, compensating=True, rng=chance, noise=noise)
-    model = TrackingRun(np.concatenate([first.tip, last.tip]), targets, first.saturated)
-    return Comparison(path, points, model, compensated)
+    tips = first.tip if last is None else np.concatenate([first.tip, last.tip])
+    return Comparison(path, points, TrackingRun(tips, targets, first.saturated), compensated)
 
 
 def _vary(
