@@ -65,7 +65,7 @@ def fig05b_trajectories(frames: pd.DataFrame) -> Figure:
     """True path of the tip and the camera's estimates, in space and from above."""
     figure, axes = new_figure(PAGE_WIDTH, 3.4)
     axes.remove()
-    figure.get_layout_engine().set(wspace=0.1)
+    figure.set_layout_engine("constrained", wspace=0.1)
     truth = frames[["true_x_mm", "true_y_mm", "true_z_mm"]].to_numpy()
     seen = frames[["x_mm", "y_mm", "z_mm"]].to_numpy()[::12]
     space = figure.add_subplot(1, 2, 1, projection="3d")
