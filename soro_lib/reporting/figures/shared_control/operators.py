@@ -44,7 +44,7 @@ def misdetection(trials: pd.DataFrame) -> Figure:
             label_axes(axes, title=f"{kind}: {label}")
             axes.title.set_fontsize(8.5)
     for axes in grid[1]:
-        label_axes(axes, "error of the detected goals [mm]")
+        label_axes(axes, "error of the goals [mm]")
     legend(figure, ncols=6)
     return figure
 

@@ -78,7 +78,8 @@ def fig08_error_against_time(trials: pd.DataFrame) -> Figure:
 def _cloud(axes: Axes, x: np.ndarray, y: np.ndarray, color: str, label: str) -> None:
     """A cloud of points on logarithmic axes and the ellipse about half of it."""
     points = np.log(np.column_stack([x, np.maximum(y, 0.05)]))
-    axes.plot(x, y, ".", markersize=2.5, markeredgewidth=0, alpha=0.5 if len(x) < 100 else 0.12, color=color)
+    size, alpha = (6.0, 0.8) if len(x) < 100 else (2.5, 0.12)
+    axes.plot(x, y, ".", markersize=size, markeredgewidth=0, alpha=alpha, color=color)
     values, vectors = np.linalg.eigh(np.cov(points.T))
     angle = np.linspace(0, 2 * np.pi, 100)
     circle = np.sqrt(2 * np.log(2)) * np.column_stack([np.cos(angle), np.sin(angle)])

@@ -68,38 +68,31 @@ def fig02_task(traces: Mapping[str, pd.DataFrame], scene: Scene) -> Figure:
         Traces of `trace_trial` by label; drawn side by side.
     scene : Scene
     """
-    figure, grid = new_figure(height=3.4, columns=len(traces), projection="3d")
+    figure, grid = new_figure(height=4.2, columns=len(traces), projection="3d")
     places = np.array([scene.start, *scene.items, *scene.targets, (0.0, 0.0, 0.0)])
     for axes, (label, trace) in zip(np.atleast_1d(grid), traces.items(), strict=True):
         path = _points(trace, "tip")
         axes.plot(*path.T, **TRUTH, label="tip")
-        axes.plot(*_points(trace, "goal").T, **{**GOAL, "marker": "."}, label="goals")
+        goals = np.unique(_points(trace, "goal")[:-1], axis=0)
+        axes.plot(*goals.T, **{**GOAL, "markersize": 5, "markeredgewidth": 1.2}, label="goals")
         axes.plot(*np.array([(0, 0, 0), path[-1]]).T, color=COLORS["light"], linewidth=7, zorder=1)
         for number, (item, target) in enumerate(zip(scene.items, scene.targets, strict=True)):
-            color = SERIES[number]
-            axes.plot(
-                *np.array([item]).T,
-                color=color,
-                marker="s",
-                markersize=8,
-                linestyle="none",
-                label=f"item {number + 1}",
-            )
+            style = {"color": SERIES[number], "linestyle": "none"}
+            axes.plot(*np.array([item]).T, "s", markersize=8, **style, label=f"item {number + 1}")
             axes.plot(
                 *np.array([target]).T,
-                color=color,
-                marker="o",
+                "o",
                 markersize=11,
                 fillstyle="none",
-                linestyle="none",
+                **style,
                 label=f"target {number + 1}",
             )
         equal_aspect(axes, np.vstack([places, path]))
         axes.invert_zaxis()
         axes.view_init(elev=22, azim=-65)
-        axes.locator_params(nbins=4)
+        axes.locator_params(nbins=3)
         label_axes(axes, "x [m]", "y [m]", "z [m]", f"{label}, {trace['time_s'].iloc[-1]:.0f} s")
-    legend(figure)
+    legend(figure, ncols=6)
     return figure
 
 

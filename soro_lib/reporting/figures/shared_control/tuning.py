@@ -1,6 +1,7 @@
 """The tuning study, the continuous blend and the stability of the guided hand."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +23,7 @@ def anova_comparison(tables: Mapping[str, pd.DataFrame]) -> Figure:
     figure, axes = new_figure(height=3.4)
     for color, (response, table) in zip(SERIES, tables.items()):
         axes.loglog(
-            table["p_plain"],
+            table["p_plain"].clip(lower=1e-4),
             table["p_blocked"],
             "o",
             markersize=4,
@@ -32,7 +33,7 @@ def anova_comparison(tables: Mapping[str, pd.DataFrame]) -> Figure:
         )
     axes.axhline(0.05, **{**REFERENCE, "linewidth": 0.9})
     axes.axvline(0.05, **{**REFERENCE, "linewidth": 0.9})
-    label_axes(axes, "p, plain n-way analysis", "p, repetitions as blocks F(1, 2)")
+    label_axes(axes, "p, plain n-way analysis (least drawn: 0.0001)", "p, repetitions as blocks F(1, 2)")
     legend(axes, title="response")
     return figure
 
@@ -56,7 +57,7 @@ def implied_scatter(table: pd.DataFrame) -> Figure:
             axes.axhline(3.5, color=COLORS["black"], linewidth=1, linestyle=":")
             axes.annotate(
                 "no quantity in 0 to 7 N\nscatters more",
-                (0.02, 3.6),
+                (0.02, 4.2),
                 xycoords=("axes fraction", "data"),
                 fontsize=6.5,
             )
@@ -70,12 +71,12 @@ def implied_scatter(table: pd.DataFrame) -> Figure:
 def passivity(table: pd.DataFrame, printed: Mapping[str, float]) -> Figure:
     """Effects of the tuning study against the passivity of the operator; the printed ones are lines."""
     chosen = {
-        "fmax_time": "f_MAX high: T [s]",
-        "xi_time": "ξ_A, ξ_S low: T [s]",
-        "fmax_assistance": "f_MAX high: H [N]",
-        "kmax_assistance": "k_MAX low, ξ_S high: H [N]",
+        "fmax_time": "f_MAX high\neffect on T [s]",
+        "xi_time": "ξ_A, ξ_S low\neffect on T [s]",
+        "fmax_assistance": "f_MAX high\neffect on H [N]",
+        "kmax_assistance": "k_MAX low, ξ_S high\neffect on H [N]",
     }
-    figure, grid = new_figure(height=2.7, columns=4)
+    figure, grid = new_figure(height=2.9, columns=4)
     for axes, (name, label) in zip(grid, chosen.items(), strict=True):
         rows = table[table["contrast"] == name]
         spread = [rows["effect"] - rows["low"], rows["high"] - rows["effect"]]
@@ -101,7 +102,7 @@ def passivity(table: pd.DataFrame, printed: Mapping[str, float]) -> Figure:
 def blend_surface(trials: pd.DataFrame) -> Figure:
     """Time and error over the machine's shares in steering and eversion, for both kinds of operator."""
     figure, grid = new_figure(height=5.0, rows=2, columns=2)
-    corners = {(0.0, 0.0): "Full", (0.0, 1.0): "MSAE", (1.0, 0.0): "ASME", (1.0, 1.0): "Auto"}
+    corners: dict[Any, str] = {(0.0, 0.0): "Full", (0.0, 1.0): "MSAE", (1.0, 0.0): "ASME", (1.0, 1.0): "Auto"}
     metrics = {"time_s": "median time [s]", "release_error_mm": "median error [mm]"}
     for row, (kind, group) in zip(grid, trials.groupby("kind", sort=False), strict=True):
         for axes, (metric, label) in zip(row, metrics.items(), strict=True):
@@ -149,6 +150,9 @@ def stability(table: pd.DataFrame, used: float) -> Figure:
         )
         axes.axhline(used, **REFERENCE, label=f"k_MAX = {used:g} N/m")
         axes.axvline(150, **{**TRUTH, "linewidth": 0.8})
+        axes.set_xticks([30, 50, 100, 200, 500], [30, 50, 100, 200, 500])
+        axes.set_yticks([0.5, 2, 10, 50, 200], [0.5, 2, 10, 50, 200])
+        axes.minorticks_off()
         label_axes(axes, "hand stiffness k_h [N/m]", title=titles[str(axis)])
     label_axes(grid[0], y="guidance stiffness k [N/m]")
     legend(figure)
