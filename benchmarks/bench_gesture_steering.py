@@ -1,7 +1,7 @@
 """Gesture steering: one control step, its quadratic program against other solvers, a replayed minute.
 
-The quadratic program is the same for all (checked before anything is timed); SLSQP solves the nonlinear problem that
-the paper gives to its SQP, from the same start.
+The quadratic program is the same for all, which is checked before anything is timed. SLSQP solves the
+nonlinear problem that the paper gives to its SQP, from the same start.
 """
 
 from collections.abc import Callable
@@ -48,10 +48,10 @@ def rows() -> list[Row]:
                  {"raw daqp, already assembled (goal: at most 3 times)": raw_daqp(pose),
                   "parametrised cvxpy (goal: 30 times)": parametrised}),
         *compare("kinematics and QP of one step", lambda: (KINEMATICS(ACTUATION), fast()),
-                 {"SciPy SLSQP, differences as gradients, like the paper's SQP (goal: 100 times)": by_differences,
+                 {"SciPy SLSQP, gradients by differences (goal: 100 times)": by_differences,
                   "SciPy SLSQP, analytic gradients": by_gradients}),
         *compare("kinematics with all Jacobians", lambda: KINEMATICS(ACTUATION),
-                 {"the same through the robot interface": lambda: generic_kinematics(ARM)(ACTUATION)}, goal=10.0),
+                 {"robot interface": lambda: generic_kinematics(ARM)(ACTUATION)}, goal=10.0),
     ]  # fmt: skip
 
 
@@ -102,7 +102,7 @@ def by_gradients() -> Any:
 
 
 def by_differences() -> Any:
-    """The same with gradients by finite differences, as the paper's solver takes them unless told otherwise."""
+    """The same with gradients by differences, as the paper's solver takes them by default."""
     return minimize(lambda step: cost(step)[0], np.zeros(7), bounds=step_bounds(), method="SLSQP")
 
 

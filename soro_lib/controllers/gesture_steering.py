@@ -166,7 +166,7 @@ class GestureSteering:
     Parameters
     ----------
     robot : Robot
-        The arm; ``CableDrivenArm`` runs compiled. Another arm's actuators all count in thousandths of SI units.
+        The arm; ``CableDrivenArm`` runs compiled. Another arm's actuators count in thousandths of SI units.
     settings : SteeringSettings, optional
         All choices.
     actuation : array_like (n,), optional
@@ -201,7 +201,7 @@ class GestureSteering:
         """Start anew at an actuation (n,); it is moved into the limits."""
         self.actuation: Array = np.clip(np.asarray(actuation, dtype=float), self._lower, self._upper)
         if not np.isfinite(self.actuation).all():
-            raise ValueError(f"GestureSteering: actuation = {actuation}, must be finite")
+            raise ValueError(f"GestureSteering: actuation = {actuation!r}, must be finite")
         self.pose = self._kinematics(self.actuation)
         self._gate = HandGate(self.settings.mapping, self.settings.gate)
         self._gesture = GestureRule(self.settings.gesture_hold, self.settings.opposite_hold)
@@ -210,6 +210,7 @@ class GestureSteering:
         self._direction.reset(self.pose.direction)
         self._hand: tuple[Vector, Vector] | None = None  # palm [m] and normal that are followed, device frame
         self._target, self._locked_mid = self.pose.tip, self.pose.mid
+        self._mode = Mode.PALM
         self._time: float | None = None
 
     def update(self, hand_sample: HandSample) -> SteeringResult:
@@ -252,10 +253,9 @@ class GestureSteering:
             palm = self._palm.update(time, hand.palm, hand.velocity).tolist()
             self._hand = (palm, hand.normal)
         elif hand.reason == "no hand" and self._hand is not None and self._palm.time is not None:
-            if time - self._palm.time <= self.settings.gate.predict_for:
-                palm = self._palm.predicted(time).tolist()
-                if self.settings.mapping.in_box(palm):
-                    self._hand = (palm, self._hand[1])
+            recent = time - self._palm.time <= self.settings.gate.predict_for
+            palm = self._palm.predicted(time).tolist() if recent else self._hand[0]
+            self._hand = (palm, self._hand[1]) if self.settings.mapping.in_box(palm) else self._hand
 
     def _goal(self, mode: Mode) -> TipGoal:
         """Return what the hand asks for under the mode; before the first hand, to stay."""
@@ -265,11 +265,10 @@ class GestureSteering:
 
     def _change(self, mode: Mode) -> None:
         """On entering the fist, lock the mid point; on leaving it, turn on from where the tip points now."""
-        if mode is not getattr(self, "_mode", Mode.PALM):
-            if mode is Mode.FIST:
-                self._locked_mid = self.pose.mid
-            elif self._mode is Mode.FIST:
-                self._direction.reset(self.pose.direction)
+        if mode is Mode.FIST and self._mode is not Mode.FIST:
+            self._locked_mid = self.pose.mid
+        elif mode is not Mode.FIST and self._mode is Mode.FIST:
+            self._direction.reset(self.pose.direction)
         self._mode = mode
 
     def _approached(self, goal: TipGoal, interval: float) -> Array:
@@ -308,7 +307,7 @@ class GestureSteering:
         return solve(problem)
 
     def _take(self, actuation_step: Array, interval: float) -> None:
-        """Take the step, shortened until the tip keeps its speed limit whatever the curvature of the model."""
+        """Take the step, shortened until the tip keeps its speed limit."""
         limit = self.settings.tip_speed * interval
         for _ in range(10):
             actuation = np.minimum(np.maximum(self.actuation + actuation_step, self._lower), self._upper)

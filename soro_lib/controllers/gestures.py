@@ -29,7 +29,7 @@ GESTURES: dict[tuple[bool, ...], Mode] = {
 
 
 def gesture_count(fingers: int = 5) -> int:
-    """Return how many gestures so many fingers can form: 2^5 = 32, not the paper's 120 = 5! (erratum GS-15)."""
+    """Return how many gestures so many fingers can form: 32, not the paper's 120 = 5! (erratum GS-15)."""
     return 2**fingers
 
 

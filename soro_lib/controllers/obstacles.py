@@ -69,7 +69,7 @@ def clearances(
 def smallest_clearance(
     robot: Robot, actuations: ArrayLike, obstacle: Sphere, points_per_piece: int = 100
 ) -> Array:
-    """Return the gap [m] between surfaces of arm and obstacle, negative in collision, for actuations (..., n)."""
+    """Return the gap [m] between arm and obstacle, negative in collision, for actuations (..., n)."""
     pieces = robot.configuration(actuations)
     points = backbone(pieces, points_per_piece)[..., points_per_piece:, :]  # from the base on
     distance = np.linalg.norm(points - np.array(obstacle.centre), axis=-1).min(axis=-1)

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 MILLIMETRE = 1e-3
 CABLE_UNITS = np.array([MILLIMETRE] + [1.0] * 6)
-"""SI value of one unit of each actuator of the cable-driven arm: a millimetre of the slide, a newton of each cable."""
+"""SI value of one unit of each actuator of the cable-driven arm: a millimetre of slide, a newton of cable."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class StepBounds(NamedTuple):
     lower, upper : ndarray (n,)
         Bounds of the step [m, then N].
     units : ndarray (n,)
-        SI value of one unit of each actuator inside the solver; a millimetre takes the slide's damping, anything
-        else lambda.
+        SI value of one unit of each actuator inside the solver; a millimetre takes the slide's damping,
+        anything else lambda.
     """
 
     lower: Array
@@ -160,7 +160,11 @@ def resolved_rate(jacobian: Array, velocity: ArrayLike, null_space_velocity: Arr
 
 
 def pose_step(
-    kinematics: Kinematics, position_step: Array, direction_step: Array, bounds: StepBounds, weights: StepWeights
+    kinematics: Kinematics,
+    position_step: Array,
+    direction_step: Array,
+    bounds: StepBounds,
+    weights: StepWeights,
 ) -> StepProblem:
     """Follow position and direction; Lai et al., Eq. (26).
 
@@ -275,8 +279,10 @@ Squares = tuple[Array, Array, float]
 def _problem(first: Squares, second: Squares, bounds: StepBounds, weights: StepWeights) -> StepProblem:
     """Add two sums of squares and the damping, in the units of the solver."""
     lower, upper, units = bounds
-    assembled = _normal_equations(*first, *second, weights.damping, weights.slide_damping, units, lower, upper)
-    return StepProblem(*assembled, units, _no_rows(len(units)), _NOTHING)
+    hessian, gradient, low, high, finite = _normal_equations(
+        *first, *second, weights.damping, weights.slide_damping, units, lower, upper
+    )
+    return StepProblem(hessian, gradient, low, high, finite, units, _no_rows(len(units)), _NOTHING)
 
 
 _NOTHING = np.zeros(0)

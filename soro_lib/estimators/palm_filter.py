@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-MEASURED = np.kron(np.eye(3), np.eye(2, 3))
+MEASURED: Array = np.kron(np.eye(3), np.eye(2, 3)).astype(np.float64)
 """Observation matrix H (6, 9): position and velocity of each axis; Lai et al., Eq. (8)."""
 MEASURED_POSITION = MEASURED[::2]
 """The position rows of H (3, 9), for trackers that report no velocity."""
@@ -62,7 +62,8 @@ PAPER_SETTINGS = PalmFilterSettings(position_sd=math.sqrt(0.7) * 1e-3, velocity_
 
 def transition_matrix(interval: float) -> Array:
     """Return the constant-acceleration transition F (9, 9) over ``interval`` [s]; Lai et al., Eq. (7)."""
-    return np.kron(np.eye(3), [[1.0, interval, 0.5 * interval**2], [0.0, 1.0, interval], [0.0, 0.0, 1.0]])
+    axis = np.array([[1.0, interval, 0.5 * interval**2], [0.0, 1.0, interval], [0.0, 0.0, 1.0]])
+    return np.asarray(np.kron(np.eye(3), axis), dtype=np.float64)
 
 
 class PalmFilter:
@@ -162,7 +163,7 @@ class PalmFilter:
         return position
 
     def _predict(self, interval: float) -> None:
-        """A priori state and covariance; Lai et al., Eqs. (6a), (9). Erratum GS-9: (9) starts from the posterior."""
+        """A priori state and covariance; Eqs. (6a), (9). Erratum GS-9: (9) starts from the posterior."""
         transition, process = self._filter.F, self._filter.Q
         for axis in (0, 3, 6):
             transition[axis, axis + 1] = transition[axis + 1, axis + 2] = interval
@@ -222,7 +223,7 @@ def slerp(start: ArrayLike, end: ArrayLike, share: float) -> Array:
 
 
 def angular_distance(start: ArrayLike, end: ArrayLike) -> float:
-    """Return the rotation angle [rad] between two unit quaternions (4,), in [0, pi]; used in Lai et al., Eq. (16)."""
+    """Return the rotation angle [rad] between two unit quaternions (4,), in [0, pi]; Lai et al., Eq. (16)."""
     start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     cosine = abs(float(start @ end))
     return 2.0 * math.acos(min(cosine, 1.0))
@@ -244,7 +245,7 @@ def low_pass_share(distance: float, range_limit: float, low_pass: float) -> floa
 
 
 def direction_quaternion(direction: ArrayLike) -> Array:
-    """Return the twist-free quaternion (w, x, y, z) that turns e_z into the unit vector ``direction`` (3,)."""
+    """Return the twist-free quaternion (w, x, y, z) that turns e_z into a unit vector (3,)."""
     x, y, z = np.asarray(direction, dtype=float).tolist()
     scale = 1.0 / math.sqrt(max(2.0 + 2.0 * z, 1e-18))
     return np.array([(1.0 + z) * scale, -y * scale, x * scale, 0.0])

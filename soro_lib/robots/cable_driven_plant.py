@@ -74,7 +74,7 @@ class PrototypeRanges:
             "friction": (0.0, 0.0),
         }
         values = {item.name: off.get(item.name, 0.0) for item in fields(self)}
-        return PrototypeRanges(**{**values, **{name: getattr(self, name) for name in names}})  # type: ignore[arg-type]
+        return PrototypeRanges(**{**values, **{name: getattr(self, name) for name in names}})
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ class Prototype:
         return points, np.einsum("nij,nj->ni", lean, poses[2][:, :3, 2])
 
     def measured(self, points: Array, rng: np.random.Generator) -> Array:
-        """Return points (n, ..., 3) [m] as the depth camera sees them: noise, and Y in steps of its resolution."""
+        """Return points (n, ..., 3) [m] as the depth camera sees them: with noise, and Y in steps."""
         seen = points + self.camera_sd * rng.standard_normal(points.shape)
         if self.depth_resolution > 0:
             seen[..., 1] = np.round(seen[..., 1] / self.depth_resolution) * self.depth_resolution
@@ -208,7 +208,7 @@ class Prototype:
         return np.hstack([first, passing + distal[:, 2:] - self.cable_radius[:, 3:] * bend2])
 
     def _pieces(self, slide: float, tension: Array) -> Array:
-        """Return pieces (n, 3, 3) under cable tensions (n, 6); the model of the arm with this prototype's values."""
+        """Return pieces (n, 3, 3) under cable tensions (n, 6): the model with this prototype's values."""
         torque = tension * self.cable_radius
         moment1, moment2 = torque[:, :3] @ _AROUND, torque[:, 3:] @ _AROUND
         load1, load2 = tension.sum(axis=1), tension[:, 3:].sum(axis=1)

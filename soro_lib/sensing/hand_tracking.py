@@ -278,7 +278,7 @@ def _playback_rows(frame: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _extended(finger: dict[str, Any]) -> bool:
-    """Return the stored flag; where the packer dropped it, call a finger bent by less than 60 degrees extended."""
+    """Return the stored flag; where the packer dropped it, a finger bent below 60 degrees is extended."""
     if "extended" in finger:
         return bool(finger["extended"])
     knuckle, middle, last = (np.asarray(finger[key]) for key in ("mcpPosition", "pipPosition", "dipPosition"))
@@ -354,9 +354,8 @@ def _require_order(table: pd.DataFrame, name: str) -> None:
     backward = np.flatnonzero(np.diff(stamp) < 0)
     if backward.size:
         row = int(backward[0]) + 1
-        raise RecordingError(
-            f"{name}: row {row + 1}, timestamp_us = {stamp[row]:.0f} is earlier than the row before ({stamp[row - 1]:.0f})"
-        )
+        late = f"timestamp_us = {stamp[row]:.0f} is earlier than the row before ({stamp[row - 1]:.0f})"
+        raise RecordingError(f"{name}: row {row + 1}, {late}")
     repeated = table.duplicated(["timestamp_us", "hand_id"]).to_numpy()
     if repeated.any():
         row = int(np.argmax(repeated))

@@ -63,7 +63,10 @@ class SteeringExplorer(ipywidgets.VBox):
         self.gesture = ipywidgets.ToggleButtons(options=[(MODE_NAMES[name], name) for name in FINGER_FLAGS])
         self.gesture.style.button_width = "92px"
         self.height = _slider("height [mm]", 100.0, 400.0, 200.0)
-        self.pitch, self.roll = _slider("pitch [deg]", -35.0, 35.0, 0.0), _slider("roll [deg]", -35.0, 35.0, 0.0)
+        self.pitch, self.roll = (
+            _slider("pitch [deg]", -35.0, 35.0, 0.0),
+            _slider("roll [deg]", -35.0, 35.0, 0.0),
+        )
         self.message = ipywidgets.HTML()
         self.view = ArmView(layout={"flex": "1 1 420px", "min_width": "320px"})
         self._time = 0.0
@@ -123,8 +126,8 @@ class SteeringExplorer(ipywidgets.VBox):
             tubes, arm.forward(result.actuation), (-0.05, -0.05, 0.0), (0.05, 0.05, 0.16),
             hangs=False, grid=0.02, caption=caption,
         )  # fmt: skip
-        error = f"{1e3 * result.position_error:.2f} mm, {math.degrees(result.direction_error):.1f} deg from the target"
-        self.message.value = result.reason or error
+        distance, angle = 1e3 * result.position_error, math.degrees(result.direction_error)
+        self.message.value = result.reason or f"{distance:.2f} mm, {angle:.1f} deg from the target"
 
 
 def explore() -> SteeringExplorer | Image:

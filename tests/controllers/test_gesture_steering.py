@@ -1,7 +1,8 @@
-"""Steering: Algorithm 1 follows a hand, and no fault of the tracker makes the arm jump, change mode or break."""
+"""Algorithm 1 follows a hand, and no fault of the tracker makes the arm jump, change mode or break."""
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -51,7 +52,7 @@ def check_sound(results, settings=None):
         assert np.isfinite(result.tip).all()
         assert bool(result.reason) != result.converged
     assert tip_speeds(results).max() <= settings.tip_speed * (1 + 1e-6)
-    for first, second in zip(results, results[1:]):
+    for first, second in pairwise(results):
         if second.time > first.time:
             most = settings.cable_rate * min(second.time - first.time, settings.longest_interval)
             assert np.abs(second.actuation[1:] - first.actuation[1:]).max() <= most + 1e-9
@@ -199,7 +200,9 @@ def test_faults_never_break_the_arm(sound_samples, fault):
     check_sound(run_with_fault(sound_samples, fault))
 
 
-@pytest.mark.parametrize("fault", ["gesture flicker, 60 ms", "unknown gesture, 1 s", "palm flip, 30 ms", "loss of 1 s"])
+@pytest.mark.parametrize(
+    "fault", ["gesture flicker, 60 ms", "unknown gesture, 1 s", "palm flip, 30 ms", "loss of 1 s"]
+)
 def test_faults_never_change_the_mode(sound_samples, fault):
     assert mode_changes(run_with_fault(sound_samples, fault)) == 0
 
@@ -238,7 +241,9 @@ def test_any_stream_whatever_gives_valid_commands(stream):
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the real recordings are not here")
 @pytest.mark.parametrize("path", sorted(REAL.glob("*.csv")), ids=lambda path: path.stem)
-@pytest.mark.parametrize("fault", ["none", "loss of 55 ms", "palm flip, 30 ms", "NaN palm, 0.2 s", "clock jumps back"])
+@pytest.mark.parametrize(
+    "fault", ["none", "loss of 55 ms", "palm flip, 30 ms", "NaN palm, 0.2 s", "clock jumps back"]
+)
 def test_real_recordings_never_break_the_arm(path, fault):
     results = run_with_fault(list(hand_samples(load_hand_recording(path))), fault)
     check_sound(results)
@@ -253,7 +258,9 @@ def test_open_and_fist_are_recognised_in_a_real_recording():
     assert changes == [Mode.PALM, Mode.FIST, Mode.PALM, Mode.FIST, Mode.PALM]
 
 
-@pytest.mark.parametrize("bad", [{"tip_speed": 0.0}, {"iterations": 0}, {"minimum_tension": 2.0}, {"turn_rate": math.nan}])
+@pytest.mark.parametrize(
+    "bad", [{"tip_speed": 0.0}, {"iterations": 0}, {"minimum_tension": 2.0}, {"turn_rate": math.nan}]
+)
 def test_bad_settings_are_named(bad):
     with pytest.raises(ValueError, match=rf"SteeringSettings\.{next(iter(bad))}"):
         SteeringSettings(**bad)

@@ -49,7 +49,9 @@ def test_unsound_frames_are_named(changes, reason):
     assert hand.reason == reason
 
 
-@pytest.mark.parametrize(("time", "reason"), [(0.01, "time did not advance"), (math.nan, "time stamp is not finite")])
+@pytest.mark.parametrize(
+    ("time", "reason"), [(0.01, "time did not advance"), (math.nan, "time stamp is not finite")]
+)
 def test_the_clock_must_advance(time, reason):
     gate, _ = tracked()
     assert gate.update(replace(FLAT, time=time)).reason == reason
@@ -91,7 +93,9 @@ def test_velocity_of_the_first_frames_is_not_believed():
 def test_a_flip_is_not_believed_at_once():
     gate, hand = tracked(normal=UPSIDE_DOWN)
     assert hand.normal == FLAT.normal
-    normals = [gate.update(replace(FLAT, time=(11 + i) * PERIOD, normal=UPSIDE_DOWN)).normal for i in range(5)]
+    normals = [
+        gate.update(replace(FLAT, time=(11 + i) * PERIOD, normal=UPSIDE_DOWN)).normal for i in range(5)
+    ]
     assert normals == [FLAT.normal] * 3 + [UPSIDE_DOWN] * 2
 
 
@@ -113,7 +117,9 @@ def test_random_flips_in_random_directions_are_never_believed():
         assert found[1] < 0
 
 
-@pytest.mark.parametrize("name", ["largest_turn", "flip_frames", "largest_jump", "reset_after", "velocity_after"])
+@pytest.mark.parametrize(
+    "name", ["largest_turn", "flip_frames", "largest_jump", "reset_after", "velocity_after"]
+)
 def test_bad_settings_are_named(name):
     with pytest.raises(ValueError, match=rf"GateSettings\.{name}"):
         GateSettings(**{name: 0})

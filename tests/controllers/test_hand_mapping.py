@@ -57,7 +57,7 @@ def test_palm_normal_is_no_euler_triple():
 
 
 def test_printed_gesture_matrices_do_not_constrain():
-    """Erratum GS-13: multiplied out, the printed matrices of (20) keep x and y; the text sets them to zero."""
+    """Erratum GS-13: multiplied out, the printed matrices of (20) keep x and y; the text does not."""
     palm = np.eye(4)
     palm[:3, :3] = Rotation.from_rotvec([0.3, 0.1, 0.0]).as_matrix()
     palm[:3, 3] = (30.0, 20.0, 110.0)
@@ -105,7 +105,13 @@ def test_reach_aware_limit_shrinks_beside_the_axis():
 
 @pytest.mark.parametrize(
     ("palm", "inside"),
-    [((0, 0.1, 0), True), ((0, 0.4, 0), True), ((0, 0.099, 0), False), ((0.151, 0.2, 0), False), ((0, 0.2, -0.2), False)],
+    [
+        ((0, 0.1, 0), True),
+        ((0, 0.4, 0), True),
+        ((0, 0.099, 0), False),
+        ((0.151, 0.2, 0), False),
+        ((0, 0.2, -0.2), False),
+    ],
 )
 def test_box(palm, inside):
     assert PalmMapping().in_box(palm) is inside

@@ -93,7 +93,7 @@ def test_null_space_motion_leaves_the_tip_alone():
 
 
 def test_euler_angles_overconstrain_a_pointing_direction():
-    """Erratum GS-16: the arm cannot choose its twist, so a reachable direction is mostly not a reachable rotation."""
+    """Erratum GS-16: the arm cannot choose its twist; a reachable direction is no reachable rotation."""
     rng = np.random.default_rng(0)
     twists = []
     for _ in range(200):
@@ -108,12 +108,14 @@ def test_euler_angles_overconstrain_a_pointing_direction():
 
 
 def test_printed_step_bound_ratchets():
-    """Erratum GS-17: bounded from above only, cables pull at once but release slowly, and the tip lags by millimetres."""
+    """Erratum GS-17: bounded from above only, cables release slowly, and the tip lags by millimetres."""
     matrix, bound = step_bound_as_printed()
     assert matrix.shape == (7, 7)
     time = np.arange(0, 8, 0.03)
     phase = 2 * np.pi * time / 8
-    path = np.column_stack([0.03 * np.sin(phase), 0.03 * np.sin(phase) * np.cos(phase), np.full_like(phase, 0.12)])
+    path = np.column_stack(
+        [0.03 * np.sin(phase), 0.03 * np.sin(phase) * np.cos(phase), np.full_like(phase, 0.12)]
+    )
 
     def errors(printed):
         actuation = np.array([0.03, *[-0.3] * 6])
@@ -174,7 +176,9 @@ def test_avoidance_is_the_linearised_cost():
     actuation = np.array([0.02, -0.5, -1, -0.3, -0.2, -0.7, -0.4])
     pose, eta, wanted = KINEMATICS(actuation), 100.0, np.array([1e-3, -2e-3, 1e-3])
     near = clearances(ARM, actuation, [BALL])
-    problem = avoiding_step(pose, wanted, near, StepBounds(-np.ones(7), np.ones(7)), StepWeights(avoidance=eta))
+    problem = avoiding_step(
+        pose, wanted, near, StepBounds(-np.ones(7), np.ones(7)), StepWeights(avoidance=eta)
+    )
 
     def cost(step):  # in mm, as printed
         after = np.clip(actuation + step * [1e-3, *[1.0] * 6], ARM.lower, ARM.upper)
@@ -192,7 +196,9 @@ def test_avoidance_is_the_linearised_cost():
 
 def test_contradicting_bounds_are_reported_not_solved():
     pose, position, direction, _, bounds = random_case(0)
-    step = solve(pose_step(pose, position, direction, StepBounds(bounds.upper + 1, bounds.lower - 1), StepWeights()))
+    step = solve(
+        pose_step(pose, position, direction, StepBounds(bounds.upper + 1, bounds.lower - 1), StepWeights())
+    )
     assert not step.converged
     assert step.reason == "the bounds contradict each other"
     np.testing.assert_array_equal(step.actuation_step, 0.0)

@@ -1,4 +1,4 @@
-"""The palm filter against a textbook recursion, spherical interpolation against SciPy, and the errata of both."""
+"""Palm filter against a textbook recursion, spherical interpolation against SciPy, and their errata."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from soro_lib.estimators.palm_filter import (
     transition_matrix,
 )
 
-unit = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: 0.1 < np.linalg.norm(q))
+unit = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)
 
 
 def normalised(values):
@@ -66,7 +66,11 @@ def wave(count=200, seed=0):
     rng = np.random.default_rng(seed)
     times = np.cumsum(rng.uniform(0.008, 0.03, count))
     phase = times[:, None] * [1.0, 2.0, 3.0]
-    return times, 0.1 * np.sin(phase) + 3e-4 * rng.standard_normal((count, 3)), 0.1 * np.cos(phase) * [1, 2, 3]
+    return (
+        times,
+        0.1 * np.sin(phase) + 3e-4 * rng.standard_normal((count, 3)),
+        0.1 * np.cos(phase) * [1, 2, 3],
+    )
 
 
 def test_filter_is_the_textbook_recursion():
@@ -77,7 +81,7 @@ def test_filter_is_the_textbook_recursion():
 
 
 def test_covariance_recursion_starts_from_the_posterior():
-    """Erratum GS-9: carried on from the a priori covariance, as printed, it never learns from a measurement."""
+    """Erratum GS-9: carried on from the a priori covariance, as printed, it never learns."""
     settings, transition = PalmFilterSettings(), transition_matrix(0.03)
     process = np.kron(np.eye(3), np.diag([0, 0, settings.acceleration_density**2 * 0.03]))
     noise = np.diag([settings.position_sd**2, settings.velocity_sd**2] * 3)
@@ -108,14 +112,15 @@ def test_adaptive_noise_calms_a_hand_at_rest():
     fixed, adaptive = PalmFilter(), PalmFilter(PalmFilterSettings(adaptive=True))
     raw = 3e-5 * rng.standard_normal((600, 3))
     runs = [
-        np.array([f.update(0.01 * i, p, (0.0, 0.0, 0.0)) for i, p in enumerate(raw)]) for f in (fixed, adaptive)
+        np.array([f.update(0.01 * i, p, (0.0, 0.0, 0.0)) for i, p in enumerate(raw)])
+        for f in (fixed, adaptive)
     ]
     assert adaptive.process_scale < 0.1
     assert np.diff(runs[1][300:], axis=0).std() < np.diff(runs[0][300:], axis=0).std()
 
 
 def test_velocity_that_lags_misleads_a_filter_that_trusts_it():
-    """R = 0.7 for all, in mm and mm/s, trusts the tracker's late velocity: the paper's single number taken literally."""
+    """R = 0.7 for all, in mm and mm/s, trusts the tracker's late velocity."""
     times, positions, _ = wave()
     late = 0.1 * np.cos((times[:, None] - 0.018) * [1.0, 2.0, 3.0]) * [1, 2, 3]
 
@@ -159,7 +164,9 @@ def test_prediction_needs_a_measurement():
         PalmFilter().predicted(0.0)
 
 
-@pytest.mark.parametrize("field", ["acceleration_density", "position_sd", "velocity_sd", "initial_variance", "window"])
+@pytest.mark.parametrize(
+    "field", ["acceleration_density", "position_sd", "velocity_sd", "initial_variance", "window"]
+)
 @pytest.mark.parametrize("value", [0, -1, np.nan])
 def test_bad_settings_name_the_field(field, value):
     with pytest.raises(ValueError, match=rf"PalmFilterSettings\.{field}"):
@@ -219,7 +226,9 @@ def test_direction_quaternion_is_twist_free_and_turns_e_z(tilt, azimuth):
     quaternion = direction_quaternion(direction)
     assert quaternion[3] == 0
     np.testing.assert_allclose(quaternion_direction(quaternion), direction, atol=1e-12)
-    np.testing.assert_allclose(Rotation.from_quat(quaternion[[1, 2, 3, 0]]).apply([0, 0, 1]), direction, atol=1e-12)
+    np.testing.assert_allclose(
+        Rotation.from_quat(quaternion[[1, 2, 3, 0]]).apply([0, 0, 1]), direction, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("interval", [0.009, 0.03, 0.09])

@@ -1,4 +1,4 @@
-"""The compiled kinematics equal the robot's; the arm obeys the paper's equations as corrected, not as printed."""
+"""The compiled kinematics equal the robot's, which obeys the paper's equations as corrected."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,9 @@ def test_compiled_equals_the_robot(cap, sign, actuation, shrink):
     pose, jacobian = arm.forward(actuation), arm.jacobian(actuation)
     np.testing.assert_allclose(compiled.tip, pose[:3, 3], atol=1e-13)
     np.testing.assert_allclose(compiled.tip_jacobian, jacobian[:3], atol=1e-12)
-    np.testing.assert_allclose(compiled.direction_jacobian, np.cross(jacobian[3:].T, pose[:3, 2]).T, atol=1e-12)
+    np.testing.assert_allclose(
+        compiled.direction_jacobian, np.cross(jacobian[3:].T, pose[:3, 2]).T, atol=1e-12
+    )
     np.testing.assert_allclose(compiled.mid, arm.mid_point(actuation), atol=1e-13)
 
 
@@ -89,7 +91,10 @@ def test_bending_angle_of_eq1_needs_the_root_over_all_terms(actuation):
     """Erratum GS-1: as printed, the root covers only the mixed term (and is not even of one unit)."""
     moment, phi = loads(actuation)
     (dx, dy, length), distal = ARM.segments(actuation)
-    stiffness, distal_moment = ARM.bending_rigidity / length, np.hypot(*distal[:2]) * ARM.bending_rigidity / distal[2]
+    stiffness, distal_moment = (
+        ARM.bending_rigidity / length,
+        np.hypot(*distal[:2]) * ARM.bending_rigidity / distal[2],
+    )
     assert distal_moment == pytest.approx(moment[1], abs=1e-12)
     mixed = 2 * moment[0] * moment[1] * np.cos(phi[0] - phi[1] + np.pi)
     corrected = np.sqrt(max(moment[0] ** 2 + moment[1] ** 2 + mixed, 0.0)) / stiffness
@@ -102,7 +107,7 @@ def test_bending_angle_of_eq1_needs_the_root_over_all_terms(actuation):
 @settings(max_examples=50, deadline=None)
 @given(ACTUATIONS)
 def test_bending_direction_of_eq2_has_no_half_turn(actuation):
-    """Erratum GS-2: without a distal moment the bend must point along phi; as printed it is turned or mirrored."""
+    """Erratum GS-2: without a distal moment the bend must point along phi; as printed it is turned."""
     actuation[4:] = -0.5  # three equal tensions: no distal moment
     moment, phi = loads(actuation)
     if moment[0] < 1e-5:
@@ -115,7 +120,7 @@ def test_bending_direction_of_eq2_has_no_half_turn(actuation):
 
 
 def test_installation_angle_is_the_coupling_sign():
-    """Erratum GS-3: zeta = pi in (1), (2) is a minus sign; a distal cable then bends the segments opposite ways."""
+    """Erratum GS-3: zeta = pi is a minus sign; a distal cable then bends the segments opposite ways."""
     actuation = np.array([0.0, 0, 0, 0, -1.0, 0, 0])
     for zeta, sign in ((np.pi, -1), (0.0, 1)):
         assert round(np.cos(zeta)) == sign
@@ -141,7 +146,10 @@ def test_straight_arm_is_regular():
 @given(st.floats(1e-3, 2.5), st.floats(-np.pi, np.pi), st.floats(0.03, 0.05))
 def test_segment_is_eq23_and_eq24(theta, phi, length):
     curvature = theta / length
-    end = np.array([np.cos(phi) * (1 - np.cos(theta)), np.sin(phi) * (1 - np.cos(theta)), np.sin(theta)]) / curvature
+    end = (
+        np.array([np.cos(phi) * (1 - np.cos(theta)), np.sin(phi) * (1 - np.cos(theta)), np.sin(theta)])
+        / curvature
+    )
     rotation = Rotation.from_euler("ZYZ", [phi, theta, -phi]).as_matrix()
     pose = arc_transform(theta * np.cos(phi), theta * np.sin(phi), length)
     np.testing.assert_allclose(pose[:3, 3], end, atol=1e-12)

@@ -27,7 +27,9 @@ def rng(seed=0):
 def test_perfect_prototype_is_the_model(by_length, command):
     points, direction = drawn_prototype(ARM, None).points(command, by_length)
     pose = ARM.forward(command)
-    np.testing.assert_allclose(points[0], [[0, 0, command[0]], ARM.mid_point(command), pose[:3, 3]], atol=1e-11)
+    np.testing.assert_allclose(
+        points[0], [[0, 0, command[0]], ARM.mid_point(command), pose[:3, 3]], atol=1e-11
+    )
     np.testing.assert_allclose(direction[0], pose[:3, 2], atol=1e-9)
 
 

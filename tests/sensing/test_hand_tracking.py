@@ -105,7 +105,9 @@ def test_playback_without_flags_derives_them_from_the_bones(tmp_path):
 
 def test_playback_frame_without_a_hand(tmp_path):
     path = tmp_path / "take.json"
-    path.write_text(json.dumps({"frames": [playback_frame(0), playback_frame(1, hands=0), playback_frame(2)]}))
+    path.write_text(
+        json.dumps({"frames": [playback_frame(0), playback_frame(1, hands=0), playback_frame(2)]})
+    )
     assert [sample.hand_id for sample in hand_samples(load_hand_recording(path))] == [3, None, 3]
 
 
@@ -123,7 +125,9 @@ def test_samples_are_si():
 def test_samples_stay_on_one_hand_of_several():
     one, two = recording(6), recording(6)
     two["hand_id"], two["palm_x_mm"] = 4, 99.0
-    both = pd.concat([two.iloc[3:], one]).sort_values("timestamp_us", kind="stable").astype({"hand_id": "Int64"})
+    both = (
+        pd.concat([two.iloc[3:], one]).sort_values("timestamp_us", kind="stable").astype({"hand_id": "Int64"})
+    )
     assert {sample.hand_id for sample in hand_samples(both)} == {7}
 
 
@@ -200,7 +204,9 @@ def test_binary_file_named_csv(tmp_path):
 def test_non_finite_values_are_named(saved, column, value):
     table = recording().astype({column: float})
     table.loc[3, column] = value
-    with pytest.raises(RecordingError, match=rf"hand\.csv: row 4, {column} = (nan|inf), expected a finite number"):
+    with pytest.raises(
+        RecordingError, match=rf"hand\.csv: row 4, {column} = (nan|inf), expected a finite number"
+    ):
         load_hand_recording(saved(table))
 
 
@@ -228,7 +234,7 @@ def test_finger_flag_out_of_range(saved):
 def test_palm_beyond_belief(saved):
     table = recording()
     table.loc[0, "palm_z_mm"] = 1e5
-    with pytest.raises(RecordingError, match="row 1, palm_z_mm = 100000.*, expected at most 2000 mm"):
+    with pytest.raises(RecordingError, match=r"row 1, palm_z_mm = 100000.*, expected at most 2000 mm"):
         load_hand_recording(saved(table))
 
 
@@ -277,7 +283,9 @@ def test_ten_million_rows_are_refused_before_they_are_parsed(tmp_path, name):
         load_hand_recording(path)
 
 
-@pytest.mark.parametrize("text", ["{}", "[1, 2]", "{", '{"frames": [1, 2]}', '{"frames": [{"id": 1}, {"id": 2}]}'])
+@pytest.mark.parametrize(
+    "text", ["{}", "[1, 2]", "{", '{"frames": [1, 2]}', '{"frames": [{"id": 1}, {"id": 2}]}']
+)
 @pytest.mark.parametrize("suffix", [".json", ".json.lz"])
 def test_playback_that_is_none(tmp_path, text, suffix):
     path = tmp_path / f"take{suffix}"

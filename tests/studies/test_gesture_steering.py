@@ -81,7 +81,7 @@ def test_rotation_about_a_point_holds_inside_the_reach():
 
 
 def test_fist_leaves_the_direction_free():
-    """Erratum GS-19: (27) has no direction term, and the direction is off by many degrees; a weight on it helps."""
+    """Erratum GS-19: (27) has no direction term, and the direction is off; a weight on it helps."""
     table = beyond.fist_direction(np.random.SeedSequence(1), (0.0, 20.0)).set_index("weight")
     assert table.loc[0.0, "direction_error_deg"] > 10.0
     assert table.loc[20.0, "direction_error_deg"] < 0.6 * table.loc[0.0, "direction_error_deg"]
@@ -146,7 +146,7 @@ def test_hover_is_longer_than_it_settles():
 
 
 def test_cost_of_eq29_does_not_guarantee_clearance():
-    """Erratum GS-20: with eta = 10 the arm still collides; the inequality keeps it clear for less than eta = 100."""
+    """Erratum GS-20: with eta = 10 the arm still collides; the inequality keeps it clear."""
     runs = {policy: avoidance.crossed(rng(1), "y 8, z 112", policy) for policy in avoidance.POLICIES}
     clearance = {policy: table["clearance_mm"].min() for policy, table in runs.items()}
     deviation = {
@@ -162,7 +162,9 @@ def test_cost_of_eq29_does_not_guarantee_clearance():
 
 
 def test_reach_map_finds_what_it_must():
-    table = beyond.reach_map(np.array([0.12]), np.array([0.0, 0.03, 0.2]), np.deg2rad([0.0, 10.0]), azimuths=4)
+    table = beyond.reach_map(
+        np.array([0.12]), np.array([0.0, 0.03, 0.2]), np.deg2rad([0.0, 10.0]), azimuths=4
+    )
     assert table["tilt_deg"].tolist()[:2] == pytest.approx([10.0, 10.0])
     assert np.isnan(table["tilt_deg"].iloc[2])
 

@@ -26,7 +26,9 @@ def test_controls_are_a_hand(explorer):
     explorer.height.value, explorer.roll.value = 250.0, 20.0
     hand = explorer.hand()
     np.testing.assert_allclose(hand.palm, (0.075, 0.25, 0.03))
-    np.testing.assert_allclose(hand.normal, (np.sin(np.deg2rad(20)), -np.cos(np.deg2rad(20)), 0.0), atol=1e-12)
+    np.testing.assert_allclose(
+        hand.normal, (np.sin(np.deg2rad(20)), -np.cos(np.deg2rad(20)), 0.0), atol=1e-12
+    )
 
 
 def test_the_arm_follows_the_pad(explorer):

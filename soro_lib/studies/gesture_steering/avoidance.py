@@ -1,4 +1,4 @@
-"""Steering past an obstacle (Lai et al., Fig. 14): the cost of Eq. (29) and a guaranteed clearance side by side."""
+"""Past an obstacle (Lai et al., Fig. 14): the cost of Eq. (29) and a guaranteed clearance side by side."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LINES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] 
     "y 0, z 104": ((0.025, 0.0, 0.104), (-0.025, 0.0, 0.104)),
     "y 20, z 140": ((0.025, 0.020, 0.140), (-0.025, 0.020, 0.140)),
 }
-"""Straight hand motions past the obstacle: start and end of the tip [m]. The paper prints no line; these are ours."""
+"""Straight motions past the obstacle, start and end of the tip [m]; the paper prints none, these are ours."""
 POLICIES: dict[str, tuple[float, float | None]] = {
     "off": (0.0, None),
     "eta = 10": (10.0, None),
@@ -121,7 +121,7 @@ def avoidance_table(
 
 
 def _beside_the_obstacle(arm: CableDrivenArm, settings: SteeringSettings, start: Array) -> GestureSteering:
-    """Return a controller that begins on the line, clear of the obstacle: found by following (26) without one."""
+    """Return a controller that begins on the line: its start is found by following (26)."""
     free = replace(settings, obstacles=(), margin=None, weights=StepWeights(direction=1.0))
     steering = GestureSteering(arm, free)
     hand = settings.mapping.palm(tuple(start))

@@ -1,4 +1,4 @@
-"""Beyond the paper: what the arm can reach, a fist that keeps its direction, delay against rate, error ellipses."""
+"""Beyond the paper: reach, a fist that keeps its direction, delay against rate, error ellipses."""
 
 from __future__ import annotations
 
@@ -47,7 +47,9 @@ def reached(
                 wanted = np.clip(position - pose.tip, -0.02, 0.02)
                 lower = np.maximum(arm.lower - actuation, -np.array([0.02, *[0.5] * 6]))
                 upper = np.minimum(arm.upper - actuation, np.array([0.02, *[0.5] * 6]))
-                step = solve(pose_step(pose, wanted, direction - pose.direction, StepBounds(lower, upper), weights))
+                step = solve(
+                    pose_step(pose, wanted, direction - pose.direction, StepBounds(lower, upper), weights)
+                )
                 actuation = np.clip(actuation + step.actuation_step, arm.lower, arm.upper)
                 if np.abs(step.actuation_step).max() < 1e-5:
                     break
@@ -142,7 +144,7 @@ def mapping_choice(reach: pd.DataFrame, scales: tuple[float, ...] = (-0.05, -0.1
 
 
 REACH_AWARE = PalmMapping(maximum_tilt=np.deg2rad(40.0), tilt_loss=np.deg2rad(40.0) / 0.040)
-"""The largest tilt that the reach map shows: 40 degrees on the axis, one degree less per millimetre beside it."""
+"""The largest tilt of the reach map: 40 degrees on the axis, one degree less per millimetre beside it."""
 
 
 def clamp_study(table: pd.DataFrame) -> pd.DataFrame:
@@ -207,8 +209,13 @@ def fist_direction(
     return pd.DataFrame(rows, columns=columns)
 
 
-def delay_against_rate(rng_seed: np.random.SeedSequence, rates: tuple[float, ...] = (115.0, 58.0, 33.0, 15.0, 11.0, 5.0),
-                       bus: ServoBus | None = None) -> pd.DataFrame:  # fmt: skip
+RATES = (115.0, 58.0, 33.0, 15.0, 11.0, 5.0)
+"""Rates of the loop whose delay is measured [Hz]; the first is the sensor's own."""
+
+
+def delay_against_rate(
+    rng_seed: np.random.SeedSequence, rates: tuple[float, ...] = RATES, bus: ServoBus | None = None
+) -> pd.DataFrame:
     """Measure the delay from the hand to the commanded tip for several loop rates.
 
     The hand follows the infinity path while its tilt sways; the delay is the shift that fits the commanded

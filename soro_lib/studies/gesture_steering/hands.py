@@ -1,4 +1,4 @@
-"""Hands: the shipped recordings, what the stream looks like, and what the filters do to it (Lai et al., Fig. 5)."""
+"""Hands: the shipped recordings, their stream, and what the filters do to it (Lai et al., Fig. 5)."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def steering_recording(
 
 
 def tracing_recording(rng: np.random.Generator, noise: HandNoise) -> pd.DataFrame:
-    """Simulate a hand tracing the edges of an A4 sheet held flat 200 mm above the device; Lai et al., Fig. 5."""
+    """Simulate a hand tracing the edges of an A4 sheet 200 mm above the device; Lai et al., Fig. 5."""
     x, z = A4_LENGTH / 2, A4_WIDTH / 2
     corners = np.array([[-x, 0.2, -z], [x, 0.2, -z], [x, 0.2, z], [-x, 0.2, z], [-x, 0.2, -z]])
     path, duration = tracing(corners, 0.2)
@@ -132,7 +132,7 @@ def tracing_recording(rng: np.random.Generator, noise: HandNoise) -> pd.DataFram
 
 
 def hover_recording(rng: np.random.Generator, duration: float = 2 * HOVER) -> pd.DataFrame:
-    """Simulate a palm that hovers for half the time, then a V-sign that hovers for the rest; Lai et al., Fig. 10."""
+    """Simulate a hovering palm for half the time, then a hovering V-sign; Lai et al., Fig. 10."""
 
     def position(time: Array) -> Array:
         return np.tile([0.05, 0.15, 0.04], (len(time), 1))
@@ -175,7 +175,8 @@ def timeline(table: pd.DataFrame, mapping: PalmMapping | None = None) -> pd.Data
         smooth = direction_filter.update(sample.time - last if last is not None else 1.0, direction)
         last = sample.time
         rows.append(
-            (sample.time - start, *np.multiply(sample.palm, 1e3), *filtered * 1e3, *np.multiply(goal.position, 1e3), *smooth,
+            (sample.time - start,
+             *np.multiply(sample.palm, 1e3), *filtered * 1e3, *np.multiply(goal.position, 1e3), *smooth,
              np.degrees(np.arccos(direction[2])), np.degrees(np.arccos(min(smooth[2], 1.0))),
              "".join("1" if flag else "0" for flag in sample.fingers), mode.value)
         )  # fmt: skip

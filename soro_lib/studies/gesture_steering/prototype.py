@@ -1,4 +1,4 @@
-"""The simulated prototype: errors of Table II and Figs. 10, 11 of Lai et al., as distributions over sessions."""
+"""The simulated prototype: errors of Table II and Figs. 10, 11 of Lai et al., over many sessions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,13 @@ from soro_lib.robots.cable_driven_kernels import compiled_kinematics
 from soro_lib.robots.cable_driven_plant import Prototype, PrototypeRanges, drawn_prototype, pointing_angle
 from soro_lib.sensing.synthetic_hand import HandNoise
 from soro_lib.studies.gesture_steering.hands import HOVER, hover_recording
-from soro_lib.studies.gesture_steering.steering import CONTROL_PERIOD, LEAD, commanding_hand, result_table, steered
+from soro_lib.studies.gesture_steering.steering import (
+    CONTROL_PERIOD,
+    LEAD,
+    commanding_hand,
+    result_table,
+    steered,
+)
 
 Array = NDArray[np.float64]
 
@@ -89,9 +95,10 @@ def table2_sessions(
 
 
 def within_claim(sessions: pd.DataFrame, bound_mm: float = 2.0) -> Array:
-    """Return, per session, whether every point of every configuration is within the bound on each axis: 0 or 1."""
+    """Return, per session, whether every axis of every point is within the bound: 0 or 1."""
     axes = sessions[[f"error_{axis}_mm" for axis in "xyz"]].abs().max(axis=1)
-    return (axes.groupby(sessions["session"]).max() <= bound_mm).to_numpy(dtype=float)
+    held = axes.groupby(sessions["session"]).max() <= bound_mm
+    return np.asarray(held, dtype=np.float64)
 
 
 def printed_percentiles(sessions: pd.DataFrame) -> pd.DataFrame:
@@ -106,7 +113,7 @@ def printed_percentiles(sessions: pd.DataFrame) -> pd.DataFrame:
     printed = experiment_error(printed_positions("sim"), printed_positions("exp")) * 1e3
     rows = []
     for (configuration, point), group in sessions.groupby(["configuration", "point"], sort=True):
-        norm, ours = printed[configuration, POINTS.index(point)], group["norm_mm"]
+        norm, ours = printed[int(str(configuration)), POINTS.index(str(point))], group["norm_mm"]
         low, median, high = np.percentile(ours, [2.5, 50, 97.5])
         rows.append((configuration, point, norm, median, low, high, 100 * float((ours < norm).mean())))
     columns = ["configuration", "point", "printed_mm", "median_mm", "low_mm", "high_mm", "percentile"]
@@ -201,7 +208,9 @@ def fig10_commands(seed: int = 1) -> dict[str, pd.DataFrame]:
         ("d", _rising_arc, _swaying, streams[2]),
     ):
         table = commanding_hand(stream, 12.0, path, direction, noise=HandNoise())
-        panels[panel] = result_table(steered(table, settings, interval=CONTROL_PERIOD), LEAD).query("time_s >= 0")
+        panels[panel] = result_table(steered(table, settings, interval=CONTROL_PERIOD), LEAD).query(
+            "time_s >= 0"
+        )
     return panels
 
 
@@ -233,7 +242,7 @@ def steady_state(measured: pd.DataFrame, settle: float = 2.0) -> pd.DataFrame:
 def tip_scatter(
     actuations: Sequence[Array], rng: np.random.Generator, sessions: int = 300
 ) -> list[tuple[Array, Array]]:
-    """Return mean (3,) [m] and covariance (3, 3) [m^2] of the true tip over prototypes, per actuation (7,)."""
+    """Return mean (3,) [m] and covariance (3, 3) [m^2] of the true tip, per actuation (7,)."""
     prototype = drawn_prototype(CableDrivenArm(), rng, sessions)
     found = []
     for actuation in actuations:

@@ -51,16 +51,17 @@ def parameter_findings() -> Findings:
 def table1_findings() -> Findings:
     """Return Table I from modulus and cross-section."""
     table = tables.table1().set_index("quantity")
+    unloaded, compressed = table["unloaded"].to_dict(), table["compressed"].to_dict()
     thickening = (
         "length alone gives EA / 45 mm; the print needs the cross-section to thicken as well (erratum GS-21)"
     )
     return {
-        "table1_young_modulus": Finding(table.loc["E", "unloaded"]),
-        "table1_axial_stiffness_low": Finding(table.loc["K_a", "unloaded"]),
-        "table1_axial_stiffness_high": Finding(table.loc["K_a", "compressed"], thickening),
-        "table1_bending_stiffness_low": Finding(table.loc["K_T", "unloaded"]),
-        "table1_bending_stiffness_high": Finding(table.loc["K_T", "compressed"]),
-        "table1_segment_length": Finding(table.loc["L_k", "unloaded"]),
+        "table1_young_modulus": Finding(unloaded["E"]),
+        "table1_axial_stiffness_low": Finding(unloaded["K_a"]),
+        "table1_axial_stiffness_high": Finding(compressed["K_a"], thickening),
+        "table1_bending_stiffness_low": Finding(unloaded["K_T"]),
+        "table1_bending_stiffness_high": Finding(compressed["K_T"]),
+        "table1_segment_length": Finding(unloaded["L_k"]),
     }
 
 
@@ -73,7 +74,7 @@ def table2_findings() -> Findings:
         for axis in "xyz":
             reason = sign if name + axis == "table2_c2_tipy" else ""
             found[f"{name}_error_{axis}"] = Finding(getattr(row, f"error_{axis}_mm"), reason)
-        found[f"{name}_norm"] = Finding(row.norm_mm)
+        found[f"{name}_norm"] = Finding(float(str(row.norm_mm)))
     errors = tables.table2_errors()[[f"error_{axis}_mm" for axis in "xyz"]].abs()
     found["table2_claim_printed"] = Finding(float((errors <= 2.0).all(axis=None)))
 
@@ -91,7 +92,7 @@ def table2_findings() -> Findings:
 
 
 def stream_findings() -> Findings:
-    """Return what the shipped recordings say about the tracker, and how long a control step takes beside it."""
+    """Return what the shipped recordings say about the tracker, and whether a control step is faster."""
     table = hands.load_recording("steering_minute")
     timing = timing_summary(table)
     control, durations = GestureSteering(CableDrivenArm()), []
@@ -113,7 +114,7 @@ def steering_findings(seed: int, seeds: int) -> Findings:
     streams = np.random.SeedSequence(seed).spawn(seeds)
     paths = [steering.fig7a(np.random.default_rng(stream)) for stream in streams]
     turns = [steering.fig7b(np.random.default_rng(stream)) for stream in streams]
-    edge = "a cone of 15 deg at 25 mm from the axis is the edge of reach (40 deg less 1 deg per mm); tremor crosses it"
+    edge = "15 deg at 25 mm from the axis is the edge of reach (40 deg less 1 deg per mm); tremor crosses it"
     found = {
         "fig7a_position": Finding([_within(table["position_error_mm"], 1.0) for table in paths]),
         "fig7a_direction": Finding([_within(table["direction_error_deg"], 2.0) for table in paths]),
@@ -158,7 +159,9 @@ def prototype_findings(seed: int, seeds: int, sessions: int, steady: pd.DataFram
     streams = np.random.SeedSequence(seed).spawn(seeds)
     runs = [prototype.table2_sessions(np.random.default_rng(stream), sessions) for stream in streams]
     medians = [run.groupby(["configuration", "point"])["norm_mm"].median() for run in runs]
-    offset = "the arm's base is registered, so errors grow towards the tip; the print suggests a frame laid at the straight tip"
+    offset = (
+        "the base is registered, so errors grow to the tip; the print's frame seems laid at the straight tip"
+    )
     found: Findings = {}
     for configuration in range(4):
         for point in POINTS:
@@ -182,10 +185,12 @@ def prototype_findings(seed: int, seeds: int, sessions: int, steady: pd.DataFram
 
 
 def avoidance_findings(summary: pd.DataFrame) -> Findings:
-    """Return Fig. 14 from the summary of :func:`soro_lib.studies.gesture_steering.avoidance.avoidance_table`."""
+    """Return Fig. 14 from the summary of :func:`avoidance.avoidance_table`."""
     by_policy = {name: rows.set_index(["line", "seed"]) for name, rows in summary.groupby("policy")}
     strong, weak, off = by_policy["eta = 100"], by_policy["eta = 10"], by_policy["off"]
-    reason = "eta = 100 on four lines; the paper prints neither eta nor its line, and the deviation follows from both"
+    reason = (
+        "eta = 100 on four lines; the paper prints neither eta nor its line, and both decide the deviation"
+    )
     found = {
         f"fig14_deviation_{axis}": Finding((strong[f"{axis}_mm"] <= bound).astype(float), reason)
         for axis, bound in (("x", 2.0), ("y", 2.0), ("z", 4.0))

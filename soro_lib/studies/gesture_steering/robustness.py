@@ -1,9 +1,10 @@
-"""What a faulty tracker does to the arm: faults put into a recording, and how long the tip takes to recover."""
+"""What a faulty tracker does to the arm: faults put into a recording, and the tip's recovery."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -37,7 +38,7 @@ def _within(change: Callable[[HandSample], HandSample], lasting: float) -> Fault
 
 
 def _lost(lasting: float, jump: float) -> Fault:
-    """Lose the hand; it returns under a new identity, displaced by ``jump`` [m] that decays in a tenth of a second."""
+    """Lose the hand; it returns under a new identity, displaced by a ``jump`` [m] that decays in 0.1 s."""
 
     def fault(samples: Samples, _: float) -> Samples:
         hit, found, identity, since = bursts(samples, lasting), [], 100, -np.inf
@@ -150,7 +151,7 @@ def tip_speeds(results: Sequence[SteeringResult], longest_interval: float = 0.1)
 
 def mode_changes(results: Sequence[SteeringResult]) -> int:
     """Return how often the mode changed."""
-    return sum(first.mode is not second.mode for first, second in zip(results, results[1:]))
+    return sum(first.mode is not second.mode for first, second in pairwise(results))
 
 
 def _clock(results: Sequence[SteeringResult]) -> Array:

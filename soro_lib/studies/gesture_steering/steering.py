@@ -98,7 +98,7 @@ def commanding_hand(
 
 
 def at_interval(samples: Iterable[HandSample], interval: float) -> list[HandSample]:
-    """Return the newest frame at each tick of a loop of the given period [s]; what a slower controller sees."""
+    """Return the frames that a controller sees that takes one per period [s]."""
     taken: list[HandSample] = []
     for sample in samples:
         if not taken or sample.time - taken[-1].time >= interval - 1e-4:
@@ -203,7 +203,7 @@ def infinity_path(time: Array, amplitude: float = 0.025, height: float = 0.120, 
 
 
 def cone(time: Array, opening: float, period: float = 8.0) -> Array:
-    """Return directions (n, 3) that go round e_z at ``opening`` [rad], wound up and down over the first second."""
+    """Return directions (n, 3) that go round e_z at ``opening`` [rad], opened over the first second."""
     time = np.asarray(time, dtype=float)
     phase = 2 * np.pi * time / period
     tilt = opening * np.clip(time, 0.0, 1.0)
@@ -215,15 +215,26 @@ def straight(time: Array) -> Array:
     return np.tile([0.0, 0.0, 1.0], (len(time), 1))
 
 
-def fig7a(rng: np.random.Generator, settings: SteeringSettings | None = None, interval: float = CONTROL_PERIOD,
-          noise: HandNoise | None = None, duration: float = 16.0) -> pd.DataFrame:  # fmt: skip
+def fig7a(
+    rng: np.random.Generator,
+    settings: SteeringSettings | None = None,
+    interval: float = CONTROL_PERIOD,
+    noise: HandNoise | None = None,
+    duration: float = 16.0,
+) -> pd.DataFrame:
     """Steer the tip along the infinity path with a flat palm; evaluated from time 0 on."""
     table = commanding_hand(rng, duration, infinity_path, straight, noise=noise)
     return result_table(steered(table, settings, interval=interval), LEAD).query("time_s >= 0")
 
 
-def fig7b(rng: np.random.Generator, settings: SteeringSettings | None = None, interval: float = CONTROL_PERIOD,
-          noise: HandNoise | None = None, opening: float = np.deg2rad(15.0), duration: float = 16.0) -> pd.DataFrame:  # fmt: skip
+def fig7b(
+    rng: np.random.Generator,
+    settings: SteeringSettings | None = None,
+    interval: float = CONTROL_PERIOD,
+    noise: HandNoise | None = None,
+    opening: float = np.deg2rad(15.0),
+    duration: float = 16.0,
+) -> pd.DataFrame:
     """Turn the tip about the fixed point (-15, -20, 140) mm."""
     settings = replace(settings or SteeringSettings(), mapping=HIGH_REACH)
     table = commanding_hand(
@@ -304,7 +315,8 @@ def loop_starts(stamps: Array, busy: float) -> Array:
     busy : float
         Time that one pass takes [s].
     """
-    starts, free, seen = [], 0.0, -1
+    starts: list[float] = []
+    free, seen = 0.0, -1
     while True:
         newest = int(np.searchsorted(stamps, free, side="right")) - 1
         frame = max(newest, seen + 1)

@@ -32,11 +32,11 @@ MODE_NAMES = {"palm": "palm", "v_sign": "V-sign", "thumbs_up": "thumbs-up", "fis
 
 def shade_modes(axes: Any, time: pd.Series, mode: pd.Series) -> None:
     """Shade the background by gesture mode; the plain palm stays white."""
-    time, mode = np.asarray(time), np.asarray(mode)
-    starts = np.flatnonzero(np.concatenate([[True], mode[1:] != mode[:-1]]))
-    for start, stop in zip(starts, [*starts[1:], len(mode) - 1]):
-        if mode[start] != "palm":
-            axes.axvspan(time[start], time[stop], color=MODE_COLORS[mode[start]], alpha=0.25, linewidth=0)
+    times, modes = np.asarray(time), np.asarray(mode)
+    starts = np.flatnonzero(np.concatenate([[True], modes[1:] != modes[:-1]]))
+    for start, stop in zip(starts, [*starts[1:], len(modes) - 1]):
+        if modes[start] != "palm":
+            axes.axvspan(times[start], times[stop], color=MODE_COLORS[modes[start]], alpha=0.25, linewidth=0)
 
 
 def stream_timing(table: pd.DataFrame) -> Figure:
@@ -59,7 +59,9 @@ def palm_before_after(timeline: pd.DataFrame) -> Figure:
     for row, axis in enumerate("xyz"):
         raw, filtered = timeline[f"raw_{axis}_mm"], timeline[f"filtered_{axis}_mm"]
         axes[row, 0].plot(timeline["time_s"], raw, **MEASUREMENT, label="tracker")
-        axes[row, 0].plot(timeline["time_s"], filtered, **{**ESTIMATE, "linewidth": 1.0}, label="Kalman filter")
+        axes[row, 0].plot(
+            timeline["time_s"], filtered, **{**ESTIMATE, "linewidth": 1.0}, label="Kalman filter"
+        )
         shade_modes(axes[row, 0], timeline["time_s"], timeline["mode"])
         axes[row, 1].plot(timeline["time_s"], raw - filtered, **{**MEASUREMENT, "markersize": 1.5})
         axes[row, 1].set_ylim(-2.0, 2.0)

@@ -58,7 +58,7 @@ def fig10_hover_and_paths(measured: pd.DataFrame) -> Figure:
 
 
 def fig11_configurations(actuations: list[Array], sim: Array, exp: Array) -> Figure:
-    """Draw the four configurations of Table II: model, printed simulation (crosses) and experiment (dots) [mm]."""
+    """Draw the four configurations of Table II: model, printed simulation and printed experiment [mm]."""
     arm = CableDrivenArm()
     figure, axes = new_figure(PAGE_WIDTH, 4.4, columns=4, projection="3d")
     for index, panel in enumerate(axes):
@@ -81,14 +81,13 @@ def fig11_configurations(actuations: list[Array], sim: Array, exp: Array) -> Fig
 
 
 def table2_distribution(placed: dict[str, pd.DataFrame]) -> Figure:
-    """Draw the error norms of Table II: simulated distribution (median, 95 % of sessions) and the printed value."""
+    """Draw the error norms of Table II: median and 95 % of simulated sessions, and the printed value."""
     figure, axes = new_figure(PAGE_WIDTH, 3.0, columns=len(placed), sharey=True)
     for panel, (name, table) in zip(np.atleast_1d(axes), placed.items()):
         place = np.arange(len(table))
-        panel.errorbar(
-            place, table["median_mm"], [table["median_mm"] - table["low_mm"], table["high_mm"] - table["median_mm"]],
-            fmt="o", color=COLORS["blue"], markersize=4, linewidth=1.2, label="simulated prototypes",
-        )  # fmt: skip
+        spread = [table["median_mm"] - table["low_mm"], table["high_mm"] - table["median_mm"]]
+        style = {"fmt": "o", "color": COLORS["blue"], "markersize": 4, "linewidth": 1.2}
+        panel.errorbar(place, table["median_mm"], spread, **style, label="simulated prototypes")
         panel.plot(place, table["printed_mm"], **GOAL, label="printed")
         labels = [f"{{{point[0].upper()}}}" for point in table["point"]]
         panel.set_xticks(place, labels)
@@ -155,4 +154,5 @@ def _ellipse(mean: Array, covariance: Array, plane: tuple[int, int]) -> Any:
     values, vectors = np.linalg.eigh(covariance[np.ix_(plane, plane)] * 1e6)
     width, height = 2 * np.sqrt(5.991 * values)  # 95 % of a chi-square with two degrees of freedom
     angle = np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0]))
-    return Ellipse(mean[list(plane)] * 1e3, width, height, angle=angle, facecolor=COLORS["blue"], alpha=0.18)
+    first, second = (1e3 * mean[list(plane)]).tolist()
+    return Ellipse((first, second), width, height, angle=angle, facecolor=COLORS["blue"], alpha=0.18)

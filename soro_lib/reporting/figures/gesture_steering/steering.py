@@ -89,7 +89,7 @@ def fig07b_rotation(table: pd.DataFrame) -> Figure:
 
 
 def _errors(axes: Any, table: pd.DataFrame) -> None:
-    """Draw position and direction error over time, with the paper's bounds 1 mm and 2 degrees as the axis limits."""
+    """Draw both errors over time, with the paper's bounds 1 mm and 2 degrees as the axis limits."""
     twin = axes.twinx()
     axes.plot(table["time_s"], table["position_error_mm"], **ESTIMATE, label="position")
     twin.plot(
@@ -112,8 +112,8 @@ def fig08_gesture_changes(tables: dict[str, pd.DataFrame]) -> Figure:
     for panel, (letter, table) in zip(axes.ravel(), tables.items()):
         shade_modes(panel, table["time_s"], table["mode"])
         for angle, symbol, color in (("alpha", "α", COLORS["blue"]), ("gamma", "γ", COLORS["green"])):
-            panel.plot(table["time_s"], table[f"target_{angle}_deg"], color=color, linestyle="--", linewidth=1.0,
-                       label=f"{symbol} asked")  # fmt: skip
+            asked, dashed = table[f"target_{angle}_deg"], {"linestyle": "--", "linewidth": 1.0}
+            panel.plot(table["time_s"], asked, color=color, **dashed, label=f"{symbol} asked")
             panel.plot(
                 table["time_s"], table[f"{angle}_deg"], color=color, linewidth=1.6, label=f"{symbol} tip"
             )
@@ -133,7 +133,7 @@ def fig09_loop_rate(table: pd.DataFrame) -> Figure:
         panel.plot(rows["time_s"], rows["rate_hz"], **{**MEASUREMENT, "markersize": 2.0})
         panel.set_ylim(0, limit)
         panel.set_xlim(0, 130)
-        label_axes(panel, "time [s]", "loop rate [Hz]", title=name)
+        label_axes(panel, "time [s]", "loop rate [Hz]", title=str(name))
     right.axhline(rows["rate_hz"].mean(), **_line(ESTIMATE))
     return figure
 
