@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.arcs import backbone
+from soro_lib.arcs import backbone, chain_transform
 from soro_lib.robots.helix import HelixArm
 from soro_lib.sensing.rendering import (
     Camera,
@@ -293,15 +293,22 @@ class HandoverScene:
         ball = np.asarray(ball, dtype=float)
         if ball.shape != (3,) or not np.isfinite(ball).all():
             raise ValueError(f"ball must be three finite numbers [m], got {ball}")
-        wrist = self.arm.forward(state)
+        wrist = self.wrist(state)
         items: list[Drawable] = [*self._arm(np.asarray(state, dtype=float)), *self._ring(wrist, extras)]
         items += self._gripper(wrist, extras.grip)
-        items.append(self._ball(ball))
+        items.append(self.ball(ball))
         if extras.hand:
             items += self._hand(ball)
         if extras.second_ball is not None:
-            items.append(self._ball(np.array(extras.second_ball)))
+            items.append(self.ball(np.array(extras.second_ball)))
         return items
+
+    def wrist(self, state: ArrayLike) -> NDArray[np.float64]:
+        """Return ``wrist_in_world`` (4, 4) for a true state q (9,), which no actuator limits."""
+        q = np.asarray(state, dtype=float)
+        if q.shape != (9,):
+            raise ValueError(f"state must be nine numbers, got shape {q.shape}")
+        return chain_transform(q.reshape(3, 3))
 
     def _arm(self, state: NDArray[np.float64]) -> list[Drawable]:
         """Return two tubes per segment, their slices alternating like the helicoid's."""
@@ -329,18 +336,19 @@ class HandoverScene:
         parts: list[Drawable] = [Tube(transform_points(wrist, palm), 0.024, (PLASTIC,))]
         along = np.array([0.38, 0.6, 0.82, 1.05]) * length
         outward = np.array([0.022, 0.040, 0.042, 0.034]) * (1 - 0.42 * grip * np.array([0, 0.6, 1, 1]))
-        for angle in 2 * np.pi * (np.arange(3) / 3 + 1 / 12):
+        for angle in 2 * np.pi * np.arange(3) / 3:
             finger = np.column_stack([outward * np.cos(angle), outward * np.sin(angle), along])
-            parts.append(Tube(transform_points(wrist, finger), 0.0055, (PLASTIC,)))
+            parts.append(Tube(transform_points(wrist, finger), 0.007, (PLASTIC,)))
         return parts
 
-    def _ball(self, centre: NDArray[np.float64]) -> Sphere:
+    def ball(self, centre: NDArray[np.float64]) -> Sphere:
+        """Return the green ball with its middle at a point (3,) [m]."""
         return Sphere(
             centre, self.ball_radius, BALL, to_light=(0.3, 0.5, -1.0), ambient=0.55, supersampling=2
         )
 
     def _hand(self, ball: NDArray[np.float64]) -> list[Drawable]:
-        """Return a palm under the ball, curled fingers and a forearm that comes from outside."""
+        """Return a palm under the ball, fingers and a forearm that comes from outside and below."""
         away = np.append(ball[:2], 0.0)
         norm = np.linalg.norm(away)
         away = away / norm if norm > 1e-6 else np.array([1.0, 0.0, 0.0])
@@ -355,12 +363,10 @@ class HandoverScene:
                 (SKIN,),
             ),
             Tube(np.array([wrist, wrist + 0.10 * away + 0.03 * down]), np.array([0.024, 0.03]), (SKIN,)),
-            Tube(
-                np.array([wrist + 0.08 * away + 0.025 * down, wrist + 0.3 * away + 0.12 * down]),
-                np.array([0.036, 0.05]),
-                (SLEEVE,),
-            ),
         ]
+        elbow, shoulder = wrist + 0.08 * away + 0.025 * down, wrist + 0.28 * away + 0.55 * down
+        sleeve = np.linspace(elbow, shoulder, 7)
+        parts += [Tube(sleeve[i : i + 2], np.array([0.036, 0.038]), (SLEEVE,)) for i in range(6)]
         for place in (-0.030, -0.012, 0.012, 0.030):
             root = palm + place * sideways
             finger = [root + 0.02 * away, root - 0.02 * away, root - 0.045 * away - 0.006 * down]

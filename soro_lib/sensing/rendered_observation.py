@@ -32,6 +32,7 @@ from soro_lib.sensing.marker_pose import (
 )
 from soro_lib.sensing.rendering import Image, Photometry
 from soro_lib.sensing.stereo_vision import (
+    CORNER_SHIFT,
     BallDetector,
     BallSight,
     CalibratedCamera,
@@ -92,6 +93,8 @@ class HandoverVision:
         Known sizes [m].
     track : bool
         Whether markers and ball are looked for around their last place first.
+    corner_shift : float
+        Correction of the markers' corners [px].
     largest_disagreement : float
         See above [m].
     largest_gap : float
@@ -109,6 +112,7 @@ class HandoverVision:
     gripper_length: float = 0.10
     ball_radius: float = 0.020
     track: bool = True
+    corner_shift: float = CORNER_SHIFT
     largest_disagreement: float = 0.10
     largest_gap: float = 0.010
 
@@ -117,7 +121,7 @@ class HandoverVision:
             raise ValueError(f"estimator must be one of {', '.join(ESTIMATORS)}, got {self.estimator!r}")
         if len(self.cameras) < 2:
             raise ValueError(f"two cameras are needed at least, got {len(self.cameras)}")
-        self.marker_detector = MarkerDetector(self.ring)
+        self.marker_detector = MarkerDetector(self.ring, corner_shift=self.corner_shift)
         self.ball_detector = BallDetector(join_pieces=self.estimator != "thesis")
         self.reset()
 
@@ -218,8 +222,11 @@ class HandoverVision:
         return seen
 
     def _balls(self, index: int, image: Image) -> list[BallSight]:
-        """Return the green circles in an image, looked for around the ball's last place, then everywhere."""
-        window = self._ball_windows[index]
+        """Return the green circles in an image, looked for around the ball's last place, then everywhere.
+
+        The thesis searches the whole image every time.
+        """
+        window = None if self.estimator == "thesis" else self._ball_windows[index]
         found = self.ball_detector.detect(image, window) if window else []
         return found or self.ball_detector.detect(image)
 
@@ -246,7 +253,7 @@ class HandoverVision:
                 gap < self.largest_gap and self._right_size(seeing, sights, place)
             ):
                 continue
-            if self._last_ball is not None:
+            if self._last_ball is not None and self.estimator != "thesis":
                 cost = float(np.linalg.norm(place - self._last_ball))
             else:
                 cost = -sum(sight.fill * sight.radius**2 for sight in sights)
