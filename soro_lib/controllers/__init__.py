@@ -8,6 +8,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "gesture_steering": ["GestureSteering"],
         "shared_control": ["AssistAsNeeded", "FixedAssistance", "GoalSelection"],
         "hybrid": ["HybridController"],
+        "handover": ["HandoverController", "HandoverParameters", "SafetyRules"],
         "virtual_stiffness": ["VirtualStiffnessController", "limit_state"],
     },
 )

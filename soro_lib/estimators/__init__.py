@@ -9,6 +9,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "extreme_learning_machine": ["ExtremeLearningMachine"],
         "grating_mask": ["GratingMask"],
         "pose_fusion": ["InverseVarianceFusion", "fuse_poses"],
+        "handover_filters": ["HandoverFilters"],
         "shape_estimation": ["estimate_shape"],
         "visual_strain": ["VisualStrainEstimator", "VisualStrainSettings"],
     },

@@ -7,6 +7,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     submod_attrs={
         "cable_driven": ["CableDrivenArm"],
         "helix": ["HelixArm"],
+        "helix_plant": ["AngleLossPlant", "ElasticPlant"],
         "pneumatic": ["PneumaticArm"],
         "pneumatic_plant": ["BackboneParameters", "ChamberParameters", "PneumaticPlant"],
         "base": ["ActuationError", "ActuationWarning", "ClippedActuation", "Robot"],

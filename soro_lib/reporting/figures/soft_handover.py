@@ -27,6 +27,7 @@ from soro_lib.reporting.plotting import (
 )
 from soro_lib.robots.helix import HelixArm, origin_from_arm_base
 from soro_lib.studies.soft_handover.handover import HandoverRun
+from soro_lib.studies.soft_handover.use_case import Carry
 
 COMMANDED: dict[str, Any] = {"color": COLORS["purple"], "linestyle": ":", "linewidth": 1.6}
 """What the tendons were cut to."""
@@ -92,6 +93,37 @@ def evolution(arm: HelixArm, run: HandoverRun, moments: Mapping[str, int]) -> Fi
         axes.set_aspect("equal")
         label_axes(axes, "towards the ball [mm]", title=f"{title} (step {step})")
     label_axes(np.atleast_1d(panels)[0], y="up [mm]")
+    legend(figure)
+    return figure
+
+
+def fig13_use_case(arm: HelixArm, run: HandoverRun, carry: Carry, release: NDArray[np.float64]) -> Figure:
+    """Draw the arm as it takes the ball, carries it and lets it go over the bowl, seen along y (Fig. 13)."""
+    figure, panels = new_figure(PAGE_WIDTH, 4.0, 1, 4, sharey=True, sharex=True)
+    heading = np.array([1.0, 0.0])
+    moments = {
+        "start": (run.states[0], run.commands[0]),
+        "taken": (run.states[-1], run.commands[-1]),
+        "on the way": (carry.states[carry.steps // 3], carry.commands[carry.steps // 3]),
+        "let go": (carry.states[-1], carry.commands[-1]),
+    }
+    in_gripper = run.ball - arm.tip_points(run.state)[3:]
+    bowl = side_view(release[None] + [0, 0, 0.08], heading)[0]
+    for axes, (title, (state, command)) in zip(panels, moments.items()):
+        held = run.ball if title == "start" else arm.tip_points(state)[3:] + in_gripper
+        draw_arm(axes, arm, command, heading, COMMANDED, "commanded")
+        draw_arm(axes, arm, state, heading, TRUTH, "true")
+        ball = side_view(held[None], heading)
+        axes.plot(*ball.T, linestyle="none", marker="o", markersize=7, color=COLORS["green"], label="ball")
+        axes.plot(
+            bowl[0] + np.array([-80, -60, 60, 80]),
+            bowl[1] + np.array([0, -50, -50, 0]),
+            color=COLORS["grey"],
+            label="bowl",
+        )
+        axes.set_aspect("equal")
+        label_axes(axes, "x [mm]", title=title)
+    label_axes(panels[0], y="up [mm]")
     legend(figure)
     return figure
 
@@ -368,6 +400,22 @@ def suggestions(runs: pd.DataFrame) -> Figure:
     label_axes(panels[0], "steps")
     label_axes(panels[1], "ball to gripper [mm]")
     label_axes(panels[2], "success [%]")
+    legend(figure)
+    return figure
+
+
+def compare_eyes(runs: pd.DataFrame) -> Figure:
+    """Draw steps and final miss through better and better eyes, one row of panels per controller."""
+    controllers = list(runs["controller"].unique())
+    figure, panels = new_figure(PAGE_WIDTH, 1.9 * len(controllers), len(controllers), 2, squeeze=False)
+    for row, controller in zip(panels, controllers):
+        chosen = runs[runs["controller"] == controller]
+        grouped_bars(row[0], chosen, "observer", "steps", "plant")
+        grouped_bars(row[1], chosen, "observer", "miss_mm", "plant")
+        row[1].set_yticklabels([])
+        label_axes(row[0], title=controller)
+    label_axes(panels[-1][0], "steps")
+    label_axes(panels[-1][1], "ball to gripper [mm]")
     legend(figure)
     return figure
 

@@ -261,7 +261,7 @@ def run_faults(
     /,
     *,
     faults: Sequence[Fault] | None = None,
-    step_limit: int = 200,
+    step_limit: int = 120,
     **labels: object,
 ) -> pd.DataFrame:
     """Return one row per run: labels, fault, severity, outcome, steps, miss_mm, violations, reason.

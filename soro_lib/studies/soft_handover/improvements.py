@@ -87,6 +87,42 @@ def compare_suggestions(
     return pd.concat(tables, ignore_index=True)
 
 
+def compare_eyes(
+    plants: Mapping[str, HelixPlant],
+    observers: Mapping[str, Observer],
+    repetitions: int,
+    seed: int,
+    step_limit: int = 300,
+) -> pd.DataFrame:
+    """Return all runs of the thesis's loop and of the best one through better and better eyes, one row per
+    run.
+
+    A third camera enters through its noise budget alone.
+    """
+    controllers = {
+        "thesis, step 0.1": thesis_parameters(0.1),
+        "thesis, step 0.4": thesis_parameters(0.4),
+        "best": best_controller(),
+    }
+    tables = [
+        handovers(
+            parameters,
+            plant,
+            observer,
+            repetitions,
+            seed,
+            step_limit=step_limit,
+            plant=plant_name,
+            observer=observer_name,
+            controller=name,
+        )[0]
+        for plant_name, plant in plants.items()
+        for observer_name, observer in observers.items()
+        for name, parameters in controllers.items()
+    ]
+    return pd.concat(tables, ignore_index=True)
+
+
 def loop_speed(
     plants: Mapping[str, HelixPlant],
     observer: Observer,

@@ -46,6 +46,28 @@ class Bowl:
         return bool(np.linalg.norm(aside) <= self.radius - self.ball_radius)
 
 
+@dataclass(frozen=True)
+class Carry:
+    """What became of a ball that was taken.
+
+    Attributes
+    ----------
+    dropped : bool
+        Whether the true ball fell into the true bowl.
+    steps : int
+    miss : float
+        Horizontal distance from the ball to the middle of the bowl when it was let go [m].
+    states, commands : ndarray, shape (steps + 1, 9)
+        True and commanded state at every look.
+    """
+
+    dropped: bool
+    steps: int
+    miss: float
+    states: NDArray[np.float64]
+    commands: NDArray[np.float64]
+
+
 def carry_and_drop(
     controller: HandoverController,
     plant: HelixPlant,
@@ -54,17 +76,8 @@ def carry_and_drop(
     handover: HandoverRun,
     rng: np.random.Generator,
     step_limit: int = 300,
-) -> tuple[bool, int, float]:
-    """Carry a ball that was taken to the bowl and let it go there.
-
-    Returns
-    -------
-    dropped : bool
-        Whether the true ball fell into the true bowl.
-    steps : int
-    miss : float
-        Horizontal distance from the ball to the middle of the bowl when it was let go [m].
-    """
+) -> Carry:
+    """Carry a ball that was taken to the bowl and let it go there."""
     arm = controller.arm
     motors = controller.parameters.motors
     calibrated = arm.tip_points(arm.home)[3:]
@@ -72,16 +85,18 @@ def carry_and_drop(
     controller.carry_to(bowl.release_point(calibrated))
     plant.carry(bowl.ball_mass)
     state = plant.settle(motors.pull(arm.tendon_lengths(controller.q_sys) - arm.tendon_lengths(arm.home)))
-    steps = 0
-    while steps < step_limit:
+    states, commands = [state], [controller.q_sys]
+    while len(states) <= step_limit:
         ball = arm.tip_points(state)[3:] + in_gripper
         command = controller.update(observer.observe(state, ball, rng))
         if command.mode in (Mode.RELEASE, Mode.STOPPED):
             break
-        steps += 1
         state = plant.settle(motors.pull(command.tendon_change))
+        states.append(state)
+        commands.append(command.q_sys)
     miss = float(np.linalg.norm((ball - bowl.release_point(calibrated))[:2]))
-    return command.mode is Mode.RELEASE and bowl.catches(ball, calibrated), steps, miss
+    dropped = command.mode is Mode.RELEASE and bowl.catches(ball, calibrated)
+    return Carry(dropped, len(states) - 1, miss, np.array(states), np.array(commands))
 
 
 def use_cases(
@@ -114,9 +129,9 @@ def use_cases(
         block, run = divmod(number, len(places))
         ball = scene.ball(places[run], calibrated, rng)
         handover = run_handover(controller, plant, observer, ball, rng, scene=scene)
-        dropped, steps, miss = False, 0, np.nan
+        carry = None
         if handover.success:
-            dropped, steps, miss = carry_and_drop(controller, plant, observer, bowl, handover, rng)
+            carry = carry_and_drop(controller, plant, observer, bowl, handover, rng)
         rows.append(
             {
                 **labels,
@@ -124,10 +139,10 @@ def use_cases(
                 "run": run,
                 "location": places[run],
                 "taken": handover.success,
-                "dropped": dropped,
+                "dropped": carry is not None and carry.dropped,
                 "handover_steps": handover.steps,
-                "carry_steps": steps,
-                "bowl_miss_mm": 1e3 * miss,
+                "carry_steps": carry.steps if carry else 0,
+                "bowl_miss_mm": 1e3 * carry.miss if carry else np.nan,
             }
         )
     return pd.DataFrame(rows)
