@@ -26,6 +26,11 @@ def output_directory(slug: str) -> Path:
     return directory
 
 
+def trials_directory() -> Path:
+    """Return the folder that trials driven by hand are recorded to."""
+    return ROOT / "build" / "trials"
+
+
 def figures_directory(slug: str) -> Path:
     """Return the folder with the finished figures and tables of one notebook, for reading.
 
