@@ -44,7 +44,7 @@ POLICIES: dict[str, tuple[float, float | None]] = {
 """Weight eta of Eq. (29) [mm^2] and guaranteed clearance [m] of the ways to avoid that are compared."""
 
 
-def crossed(rng: np.random.Generator, line: str, policy: str, duration: float = 8.0) -> pd.DataFrame:
+def crossed(rng: np.random.Generator, line: str, policy: str, duration: float = 6.0) -> pd.DataFrame:
     """Steer the tip along a straight line past the obstacle.
 
     Parameters

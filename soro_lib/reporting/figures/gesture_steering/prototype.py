@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
-from soro_lib.reporting.figures.gesture_steering.steering import draw_arm
 from soro_lib.reporting.plotting import (
     COLORS,
     ESTIMATE,
@@ -19,7 +18,6 @@ from soro_lib.reporting.plotting import (
     PAGE_WIDTH,
     REFERENCE,
     box_groups,
-    equal_aspect,
     error_band,
     label_axes,
     legend,
@@ -58,24 +56,22 @@ def fig10_hover_and_paths(measured: pd.DataFrame) -> Figure:
 
 
 def fig11_configurations(actuations: list[Array], sim: Array, exp: Array) -> Figure:
-    """Draw the four configurations of Table II: model, printed simulation and printed experiment [mm]."""
+    """Draw the four configurations of Table II from the front and from the side [mm], with the printed points."""
     arm = CableDrivenArm()
-    figure, axes = new_figure(PAGE_WIDTH, 4.4, columns=4, projection="3d")
+    figure, axes = new_figure(PAGE_WIDTH, 4.3, columns=8, sharey=True)
     for index, panel in enumerate(axes):
-        draw_arm(panel, arm, actuations[index], strength=0.7)
-        panel.scatter(
-            *sim[index].T * 1e3, color=COLORS["vermillion"], marker="x", s=30, depthshade=False, label="sim."
-        )
-        panel.scatter(
-            *exp[index].T * 1e3, color=COLORS["black"], marker="o", s=12, depthshade=False, label="exp."
-        )
-        equal_aspect(panel, [[-14, -14, 30], [14, 14, 160]], margin=0.0)
-        panel.set_box_aspect((1, 1, 3.0), zoom=1.12)
-        panel.set_title(f"Config. {index}", fontsize=9)
-        panel.tick_params(labelsize=6, pad=-2)
-        panel.set_xticks([-10, 0, 10])
-        panel.set_yticks([-10, 0, 10])
-        panel.view_init(elev=12, azim=-60)
+        configuration, axis = divmod(index, 2)
+        points = arm.backbone(actuations[configuration], 20) * 1e3
+        pieces = (points[:21], points[20:41], points[40:])
+        for piece, color in zip(pieces, (COLORS["light"], COLORS["blue"], COLORS["orange"])):
+            panel.plot(piece[:, axis], piece[:, 2], color=color, linewidth=6, solid_capstyle="butt", zorder=1)
+        panel.plot(*sim[configuration][:, (axis, 2)].T * 1e3, **GOAL, label="printed simulation")
+        panel.plot(*exp[configuration][:, (axis, 2)].T * 1e3, "o", color=COLORS["black"], markersize=3.5,
+                   label="printed experiment", zorder=5)  # fmt: skip
+        panel.set(xlim=(-14, 14), ylim=(25, 158), aspect="equal", xticks=(-10, 0, 10))
+        label_axes(panel, f"{'XY'[axis]} [mm]", title=f"Config. {configuration}" if axis == 0 else "")
+        panel.title.set_fontsize(8.5)
+    label_axes(axes[0], y="Z [mm]")
     legend(figure)
     return figure
 

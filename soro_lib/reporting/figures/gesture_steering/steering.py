@@ -147,7 +147,7 @@ def palm_workspace(reach: pd.DataFrame) -> Figure:
     )
     figure.colorbar(mesh, ax=axes[0], label="tilt towards every side [deg]")
     axes[0].grid(False)
-    for color, (height, row) in zip(SERIES, grid.iloc[:: max(len(grid) // 4, 1)].iterrows()):
+    for color, (height, row) in zip(SERIES, grid.iloc[:: max(len(grid) // 3, 1)].iterrows()):
         axes[1].plot(row.index, row, marker="o", markersize=3, color=color, label=f"z = {height:.0f} mm")
     label_axes(
         axes[0], "distance from the axis [mm]", "height of the tip [mm]", title="Where the tip can point"
