@@ -115,9 +115,27 @@ def learn_online(
 
 
 def compare_networks(
-    seed: int, *, seeds: int = 5, networks: Mapping[str, Mapping[str, Any]] = NETWORKS, steps: int = 4000
+    seed: int,
+    *,
+    seeds: int = 5,
+    networks: Mapping[str, Mapping[str, Any]] = NETWORKS,
+    steps: int = 4000,
+    labels: Array | None = None,
 ) -> pd.DataFrame:
     """Run every network setting on the same spirals.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of fibres, nodes and noise.
+    seeds : int
+        Number of fibres.
+    networks : mapping
+        Settings by name.
+    steps : int
+        Samples of the spiral.
+    labels : ndarray (steps, 7), optional
+        Recorded camera poses of it; white noise about the truth without them [m, -].
 
     Returns
     -------
@@ -130,11 +148,11 @@ def compare_networks(
     for number, child in enumerate(np.random.SeedSequence(seed).spawn(seeds)):
         rng = np.random.default_rng(child)
         shifts = read_fibre(glue_fibre(rng), motion, rng)
-        labels = noisy_labels(motion, rng)
+        seen = noisy_labels(motion, rng) if labels is None else labels
         nodes = int(rng.integers(2**32))
         for name, settings in networks.items():
             network = ExtremeLearningMachine(np.random.default_rng(nodes), **settings)
-            run = learn_online(network, shifts, labels, motion.pose)
+            run = learn_online(network, shifts, seen, motion.pose)
             rows.append({"network": name, "seed": number, **_errors(run)})
     return pd.DataFrame(rows)
 

@@ -70,6 +70,7 @@ def compare_controllers(
     rng: np.random.Generator,
     *,
     seeds: int = 10,
+    cycles: int = CYCLES,
     readings: Mapping[str, HybridSettings] = READINGS,
     plant: FittedPlant | None = None,
     maximum_step: float = 3e-3,
@@ -86,6 +87,8 @@ def compare_controllers(
         Draws the noise of the position sensor, and the plants if they differ.
     seeds : int
         Number of repetitions.
+    cycles : int
+        Cycles of either phase; the paper runs two.
     readings : mapping of HybridSettings
         Compensators by name.
     plant : FittedPlant, optional
@@ -99,7 +102,7 @@ def compare_controllers(
     """
     plant = plant or load_plant(path)
     points = path_points(path, plant.rotation)
-    targets = np.tile(points, (CYCLES, 1))
+    targets = np.tile(points, (cycles, 1))
     batch = (seeds, len(GAINS))
     base = HybridSettings(proportional_gain=np.array(GAINS), maximum_step=maximum_step, compensation="none")
     arm = PneumaticArm()
@@ -147,7 +150,7 @@ def summarise(comparison: Comparison) -> pd.DataFrame:
         deviation_mm, deviation_sd_mm, deviation_percent (mean of deviation over distance of the path point
         from the start), saturated.
     """
-    radius = np.linalg.norm(np.tile(comparison.points, (CYCLES, 1)), axis=-1)[:, None, None]
+    radius = np.linalg.norm(comparison.model.target, axis=-1)[:, None, None]
     rows = []
     for name, run in comparison.runs.items():
         error, deviation = 1e3 * run.error, 1e3 * run.deviation(comparison.points)

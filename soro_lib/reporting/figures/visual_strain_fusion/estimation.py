@@ -53,7 +53,7 @@ def elm_before_and_after(table: pd.DataFrame) -> Figure:
         axes.errorbar(mean, rows, xerr=spread, linestyle="none", color=color, marker=marker, label=label)
     axes.set_yticks(rows, labels=list(groups.groups))
     axes.invert_yaxis()
-    axes.set_xlim(0.0, 1.1)
+    axes.set_xlim(0.0, 1.3)
     for row, (_, group) in zip(rows, groups):
         if group.prior_mean_mm.mean() > 10.0:
             axes.text(
