@@ -213,7 +213,8 @@ function drawHand(context, view, scene, frame, aim, ink) {
   stroke(context, [head[0], end, head[1]], INK.force, 4);
   context.fillStyle = INK.force;
   context.font = "600 12px sans-serif";
-  context.fillText(`${Math.hypot(...frame.force).toFixed(1)} N`, end[0] + 8, end[1] - 8);
+  const label = [end[0] + 22 * Math.cos(angle) - 14, end[1] + 22 * Math.sin(angle) + 4];
+  context.fillText(`${Math.hypot(...frame.force).toFixed(1)} N`, ...label);
 }
 
 function drawView(context, view, state) {

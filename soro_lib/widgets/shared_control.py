@@ -39,6 +39,9 @@ LOW, HIGH = (-0.26, -0.33, 0.0), (0.56, 0.33, 0.72)
 TABLE = 0.67
 """Height of the table below the base [m]."""
 
+HAND_STIFFNESSES = (50.0, 75.0, 100.0, 150.0, 225.0, 300.0, 450.0, 600.0)
+"""Hands to choose from [N/m]: hardly holding on to gripping firmly."""
+
 LONGEST_GAP = 5.0
 """Longest time between two inputs that is believed [s]."""
 
@@ -251,7 +254,7 @@ class OperatorExplorer(ipywidgets.VBox):
     Attributes
     ----------
     paradigm, environment, law : ipywidgets.Dropdown
-    stiffness : ipywidgets.FloatLogSlider
+    stiffness : ipywidgets.SelectionSlider
         Of the hand [N/m].
     view : OperatorView
     trial : DrivenTrial or None
@@ -268,9 +271,9 @@ class OperatorExplorer(ipywidgets.VBox):
         )
         self.environment = _choice("arm", ["simulated", "real"], "170px")
         self.law = _choice("force law", ["printed", "program"], "190px")
-        self.stiffness = ipywidgets.FloatLogSlider(
-            description="hand [N/m]", min=1.5, max=3.0, step=0.05, value=EXPERT.hand_stiffness,
-            readout_format=".0f", layout={"width": "300px"}, style={"description_width": "80px"},
+        self.stiffness = ipywidgets.SelectionSlider(
+            description="hand [N/m]", options=HAND_STIFFNESSES, value=EXPERT.hand_stiffness,
+            layout={"width": "280px"}, style={"description_width": "80px"},
         )  # fmt: skip
         self.controls = (self.paradigm, self.environment, self.law, self.stiffness)
         self.view = OperatorView(layout={"width": "100%"})
