@@ -12,5 +12,6 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "pneumatic_plant": ["BackboneParameters", "ChamberParameters", "PneumaticPlant"],
         "base": ["ActuationError", "ActuationWarning", "ClippedActuation", "Robot"],
         "soft_growing": ["SoftGrowingArm", "redistribute_actuation"],
+        "soft_growing_plant": ["PlantParameters", "SoftGrowingPlant", "real_arm"],
     },
 )

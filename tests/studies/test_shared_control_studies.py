@@ -168,6 +168,18 @@ def test_summary_brackets_its_mean(crowd):
     assert len(table) == 2 * 2 * 6 * 4
 
 
+def test_effects_are_paired_differences(crowd):
+    table = demonstrations.effects(crowd, resamples=200)
+    assert len(table) == 2 * 2 * 5 * 4
+    people = crowd.pivot_table(index=["environment", "kind", "operator"], columns="paradigm", values="time_s")
+    expected = (people["msae"] - people["full_teleoperation"]).loc["real", "naive"].mean()
+    row = table.query(
+        "environment == 'real' and kind == 'naive' and paradigm == 'msae' and metric == 'time_s'"
+    )
+    assert row["mean"].item() == pytest.approx(expected)
+    assert row["low"].item() <= expected <= row["high"].item()
+
+
 def test_conditions_share_the_paradigms_without_a_force():
     trials = demonstrations.run_conditions(1, 1, trials=1)
     assert len(trials) == 3 * 2 * 2 * 24

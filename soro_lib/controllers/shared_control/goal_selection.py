@@ -64,7 +64,7 @@ def fetch(rule: GoalRule, item: int) -> GoalState:
 
 @register_jitable(forceinline=True)
 def goal_step(rule: GoalRule, state: GoalState, end_effector: Vector, item_held: bool) -> GoalState:
-    """One call of Goal Selection; several transitions may happen in it (Stroppa et al., Fig. 4).
+    """One call of Goal Selection; several transitions may happen in it (Stroppa et al., Fig. 4, SC-35).
 
     An item lost while it is lifted sends the mended machine back to fetch it, straight below the place of the
     loss. The printed machine has no such arrow: it lifts on, then takes the empty gripper for a delivery.

@@ -148,6 +148,12 @@ APPROACHES = {"from above": 0.1, "straight": 0.0}
 """How much higher the operators aim while far away [m]."""
 
 
+RESULTS = ("time_s", "release_error_mm", "path_m", "assistance_n")
+"""What the tables of results show."""
+
+CELLS = ["environment", "kind", "paradigm"]
+
+
 def summary(trials: pd.DataFrame, resamples: int = 2000, seed: int = 0) -> pd.DataFrame:
     """Mean of each metric over people, with a 95 % bootstrap interval over people.
 
@@ -158,26 +164,43 @@ def summary(trials: pd.DataFrame, resamples: int = 2000, seed: int = 0) -> pd.Da
     pandas.DataFrame
         Columns environment, kind, paradigm, metric, mean, low, high, finished (share of trials).
     """
-    metrics = ["time_s", "release_error_mm", "path_m", "assistance_n"]
-    cells = ["environment", "kind", "paradigm"]
-    people = trials.groupby([*cells, "operator"], sort=False)[metrics].mean()
-    finished = trials.groupby(cells, sort=False)["finished"].mean().to_dict()
+    people = trials.groupby([*CELLS, "operator"], sort=False)[list(RESULTS)].mean()
+    finished = trials.groupby(CELLS, sort=False)["finished"].mean().to_dict()
+    rows = _over_people(people, resamples, seed)
+    return rows.assign(
+        finished=[finished[cell] for cell in zip(*(rows[name] for name in CELLS), strict=True)]
+    )
+
+
+def effects(
+    trials: pd.DataFrame, reference: str = "full_teleoperation", resamples: int = 2000, seed: int = 0
+) -> pd.DataFrame:
+    """What each paradigm changes against a reference, person by person, with 95 % bootstrap intervals.
+
+    The same people meet the same chance under every paradigm, so the differences are paired.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns environment, kind, paradigm, metric, mean, low, high: paradigm less reference.
+    """
+    people = trials.groupby([*CELLS, "operator"], sort=False)[list(RESULTS)].mean().reset_index()
+    keys = ["environment", "kind", "operator"]
+    base = people[people["paradigm"] == reference].set_index(keys)[list(RESULTS)]
+    others = people[people["paradigm"] != reference].set_index([*CELLS, "operator"])
+    aligned = base.reindex(others.reset_index("paradigm").index).to_numpy()
+    return _over_people(others - aligned, resamples, seed)
+
+
+def _over_people(people: pd.DataFrame, resamples: int, seed: int) -> pd.DataFrame:
+    """Mean and bootstrap interval over the operators of every cell."""
     rng = np.random.default_rng(seed)
     rows = []
-    for cell, group in people.groupby(cells, sort=False):
+    for cell, group in people.groupby(CELLS, sort=False):
         values = group.to_numpy()
         picks = rng.integers(len(values), size=(resamples, len(values)))
         low, high = np.nanpercentile(np.nanmean(values[picks], axis=1), [2.5, 97.5], axis=0)
-        for index, metric in enumerate(metrics):
-            row = dict(zip(cells, cell, strict=True))
-            row |= {"metric": metric, "mean": np.nanmean(values[:, index])}
-            rows.append({**row, "low": low[index], "high": high[index], "finished": finished[cell]})
+        for index, metric in enumerate(group.columns):
+            row = {**dict(zip(CELLS, cell, strict=True)), "metric": metric}
+            rows.append({**row, "mean": np.nanmean(values[:, index]), "low": low[index], "high": high[index]})
     return pd.DataFrame(rows)
-
-
-def paired_effect(trials: pd.DataFrame, first: str, second: str, metric: str) -> pd.DataFrame:
-    """Difference of two paradigms for every operator, columns environment, kind, operator, difference."""
-    means = trials.pivot_table(
-        index=["environment", "kind", "operator"], columns="paradigm", values=metric, sort=False
-    )
-    return (means[first] - means[second]).rename("difference").reset_index()
