@@ -6,9 +6,11 @@ interrupted run leaves whole files only. The same seed and the locked packages g
 
 import argparse
 import os
+import signal
 import sys
-from concurrent.futures import ProcessPoolExecutor, wait
-from multiprocessing import Manager
+import time
+from collections.abc import Sequence
+from multiprocessing import Manager, Pool
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +80,24 @@ def record(name: str, directory: Path, progress: Any = None, steps: int = STEPS)
     return [table, points]
 
 
+def _record_all(names: Sequence[str], directory: Path, jobs: int, steps: int) -> list[Path]:
+    """Record flights in parallel and show their progress; leaving early stops the processes."""
+    ignore_interrupts = (signal.SIGINT, signal.SIG_IGN)
+    with (
+        Manager() as manager,
+        Pool(min(jobs, len(names)), signal.signal, ignore_interrupts) as pool,
+        Progress() as progress,
+    ):
+        counts = manager.dict()
+        tasks = {name: progress.add_task(name, total=steps) for name in names}
+        results = [pool.apply_async(record, (name, directory, counts, steps)) for name in names]
+        while not all(result.ready() for result in results):
+            for name, task in tasks.items():
+                progress.update(task, completed=counts.get(name, 0))
+            time.sleep(0.3)
+        return [path for result in results for path in result.get()]
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Record all flights, show the progress and say which files changed."""
     parser = argparse.ArgumentParser(description="Render and track the camera flights again.")
@@ -88,14 +108,13 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
     names = [options.only] if options.only else list(FLIGHTS)
-    with Manager() as manager, ProcessPoolExecutor(options.jobs) as pool, Progress() as progress:
-        counts = manager.dict()
-        tasks = {name: progress.add_task(name, total=options.steps) for name in names}
-        jobs = {name: pool.submit(record, name, options.output, counts, options.steps) for name in names}
-        while wait(jobs.values(), timeout=0.5).not_done:
-            for name, task in tasks.items():
-                progress.update(task, completed=counts.get(name, 0))
-        written = [path for job in jobs.values() for path in job.result()]
+    try:
+        written = _record_all(names, options.output, options.jobs, options.steps)
+    except KeyboardInterrupt:
+        for unfinished in options.output.glob("*.part*"):
+            unfinished.unlink()
+        print("interrupted; the flights that were complete are kept", file=sys.stderr)
+        return 130
     for path in written:
         print(f"{path.name}  {read_card(path)['sha256']}")
     return 0
