@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from soro_lib.reporting.plotting import COLORS, PAGE_WIDTH, REFERENCE, label_axes, legend, new_figure
+from soro_lib.reporting.published import load_published
 from soro_lib.robots.pneumatic_plant import Wall
 from soro_lib.studies.visual_strain_fusion.closed_curve import CurveRun, octopus
 from soro_lib.studies.visual_strain_fusion.hybrid_control import Comparison
@@ -132,8 +133,12 @@ def tables12_learning_or_gain(summary: pd.DataFrame) -> Figure:
 
 
 def cap_or_no_cap(summaries: Mapping[str, pd.DataFrame]) -> Figure:
-    """Draw the model-based error over the gain under several hypotheses about the 3 mm."""
+    """Draw the model-based error over the gain under several hypotheses about the 3 mm, and as published."""
     figure, axes = new_figure(PAGE_WIDTH, 3.2, columns=2)
+    published = load_published("visual_strain_fusion")
+    for panel, table in zip(axes, ("table1", "table2")):
+        cells = [published[f"{table}_kp{100 * gain:02.0f}_model_error_mean"].value for gain in GAINS]
+        panel.plot(GAINS, cells, "x", color=COLORS["black"], markersize=8, zorder=5, label="published")
     for name, summary in summaries.items():
         model = summary[summary.controller == "model"]
         for panel, path in zip(axes, ("pentagram", "circle")):
@@ -142,7 +147,7 @@ def cap_or_no_cap(summaries: Mapping[str, pd.DataFrame]) -> Figure:
             label_axes(panel, "gain Kp [-]", "model-based error [mm]", title=path)
             panel.set_xticks(GAINS)
             panel.set_ylim(0, 32)
-    legend(figure, ncols=2)
+    legend(figure, ncols=3)
     return figure
 
 
