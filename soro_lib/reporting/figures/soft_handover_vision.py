@@ -4,6 +4,7 @@ Pictures are blue, green, red as OpenCV has them; errors in mm and degrees.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,11 +12,13 @@ import pandas as pd
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import NDArray
 
 from soro_lib.reporting.plotting import COLORS, PAGE_WIDTH, label_axes, legend, new_figure
 from soro_lib.sensing.rendered_observation import Look
 from soro_lib.sensing.rendering import Image
-from soro_lib.sensing.stereo_vision import CalibratedCamera
+from soro_lib.sensing.stereo_vision import CalibratedCamera, around
 
 ESTIMATOR_COLORS = {"thesis": COLORS["orange"], "gated": COLORS["sky"], "joint": COLORS["blue"]}
 """The three pose estimators."""
@@ -51,6 +54,15 @@ def annotated(image: Image, camera: CalibratedCamera, look: Look, index: int, th
     return picture
 
 
+def plain_logarithm(axes: Any, name: str) -> None:
+    """Make the axis "x" or "y" logarithmic, with ticks at 1, 2 and 5 written as plain numbers."""
+    axes.set(**{f"{name}scale": "log"})
+    axis = getattr(axes, f"{name}axis")
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def fig04_detections(
     images: Sequence[Image], cameras: Sequence[CalibratedCamera], look: Look, titles: Sequence[str] = ()
 ) -> Figure:
@@ -64,12 +76,34 @@ def fig04_detections(
     return figure
 
 
-def fig15_occlusion(table: pd.DataFrame, picture: Image, hidden: float) -> Figure:
-    """Draw the error of the ball against its visible share, beside a picture of a hidden ball."""
-    figure, (left, right) = new_figure(PAGE_WIDTH, 3.0, 1, 2, width_ratios=(1, 1.7))
-    left.imshow(picture[..., ::-1])
-    left.set_axis_off()
-    left.set_title("a ball behind a finger")
+def close_ups(
+    images: Sequence[Image],
+    cameras: Sequence[CalibratedCamera],
+    look: Look,
+    ball: NDArray[np.float64],
+    half: int = 70,
+) -> list[Image]:
+    """Return what each camera shows around a true ball (3,) [m], the found circle drawn finely."""
+    pictures = []
+    for i, (image, camera) in enumerate(zip(images, cameras)):
+        rows, columns = around(tuple(camera.project([ball])[0].tolist()), half, image.shape)
+        picture = image.copy()
+        sight = look.chosen[i]
+        if sight is not None:
+            x, y = (round(8 * value) for value in sight.centre)
+            cv2.circle(picture, (x, y), round(8 * sight.radius), YELLOW, 1, cv2.LINE_AA, shift=3)
+            cv2.circle(picture, (x, y), 12, RED, -1, cv2.LINE_AA, shift=3)
+        pictures.append(picture[rows, columns])
+    return pictures
+
+
+def fig15_occlusion(table: pd.DataFrame, pictures: Sequence[Image], hidden: float) -> Figure:
+    """Draw the error of the ball against its visible share, beside the pictures of the worst case."""
+    figure, (left, middle, right) = new_figure(PAGE_WIDTH, 2.9, 1, 3, width_ratios=(1, 1, 2.2))
+    for axes, picture, name in zip((left, middle), pictures, ("worst case: left", "and right camera")):
+        axes.imshow(picture[..., ::-1])
+        axes.set_axis_off()
+        axes.set_title(name)
     for rule, group in table.groupby("rule", sort=False):
         marker = "o" if rule == "largest piece" else "."
         right.plot(
@@ -83,9 +117,12 @@ def fig15_occlusion(table: pd.DataFrame, picture: Image, hidden: float) -> Figur
             label=str(rule),
         )
     right.axvline(100 * hidden, color=COLORS["grey"], linewidth=0.8, linestyle=":")
-    right.set_yscale("log")
+    plain_logarithm(right, "y")
     label_axes(
-        right, "visible share of the ball, worse camera [%]", "error of the ball [mm]", title="200 balls"
+        right,
+        "visible share of the ball, worse camera [%]",
+        "error of the ball [mm]",
+        title=f"{table['pose'].nunique()} balls",
     )
     legend(right)
     return figure
@@ -98,7 +135,7 @@ def fig14_workspace(table: pd.DataFrame) -> Figure:
     """Draw which cameras see ring and ball at every place of the gripper, in three planes."""
     depths = sorted(table["y_mm"].unique())
     colors = (COLORS["light"], "#f3d9a4", "#b5d8ee", COLORS["green"])
-    figure, panels = new_figure(PAGE_WIDTH, 2.9, 1, len(depths), sharey=True)
+    figure, panels = new_figure(PAGE_WIDTH, 2.35, 1, len(depths), sharey=True)
     for axes, depth in zip(panels, depths):
         plane = table[table["y_mm"] == depth]
         seen = plane["left"].astype(int) + 2 * plane["right"].astype(int)
@@ -139,7 +176,7 @@ def error_budget(budget: pd.DataFrame) -> Figure:
             axes.hlines(place, median, high, color=color, linewidth=2.0)
             axes.plot(median, place, "o", color=color, markersize=5, label=estimator)
             axes.plot(high, place, "|", color=color, markersize=8, markeredgewidth=2)
-        axes.set_xscale("log")
+        plain_logarithm(axes, "x")
         label_axes(axes, f"error of the {what} [{unit}]")
     left.set_yticks(range(len(names)), names)
     left.invert_yaxis()
@@ -165,7 +202,7 @@ def degradations(table: pd.DataFrame) -> Figure:
         share = 100 * thesis[column].apply(lambda errors: errors.notna().mean())
         what = "arm found" if column == "gripper_mm" else "ball found"
         right.barh(np.arange(len(names)) + shift, share[names], 0.32, color=color, label=what)
-    left.set_xscale("log")
+    plain_logarithm(left, "x")
     left.set_yticks(range(len(names)), names)
     left.invert_yaxis()
     label_axes(left, "error of the gripper [mm]", title="median to 95th percentile")
@@ -235,7 +272,7 @@ def rendered_handovers(runs: pd.DataFrame) -> Figure:
                 label=f"plant {plant}, {estimator}",
             )
         axes.set_xticks(range(len(names)), [name.replace("thesis, step ", "") for name in names])
-    left.set_yscale("log")
+    plain_logarithm(left, "y")
     label_axes(left, "step size of the thesis's controller, or best", "steps to the closed gripper")
     label_axes(right, "step size of the thesis's controller, or best", "ball from gripper point [mm]")
     legend(figure, ncols=3)
@@ -263,7 +300,7 @@ def comparison_with_noise_model(rendered: pd.DataFrame, modelled: Mapping[str, p
             axes.plot(place, steps.median(), marker, color=color, markersize=5, label=f"{estimator}, {name}")
     step_sizes = sorted(rendered["alpha"].unique())
     axes.set_xticks(range(len(step_sizes)), [f"{size:g}" for size in step_sizes])
-    axes.set_yscale("log")
+    plain_logarithm(axes, "y")
     label_axes(axes, "step size", "steps to the closed gripper")
     legend(axes)
     return figure

@@ -26,11 +26,17 @@ from soro_lib.project import data_directory
 from soro_lib.robots.helix_plant import ElasticPlant
 from soro_lib.sensing.rendered_observation import ESTIMATORS
 from soro_lib.studies.soft_handover.rendered_handovers import rendered_block
-from soro_lib.studies.soft_handover.vision import NoiseSources, Report, accuracy, noise_figures, still_looks
+from soro_lib.studies.soft_handover.vision import (
+    SEED,
+    NoiseSources,
+    Report,
+    accuracy,
+    noise_figures,
+    still_looks,
+)
 from soro_lib.studies.soft_handover.vision_limits import degradations, image_faults, occlusion
 
 SLUG = "soft_handover"
-SEED = 7
 GENERATOR = "soro_lib.studies.soft_handover.record"
 POSES = {
     "vision_accuracy": 200,

@@ -34,6 +34,9 @@ from soro_lib.sensing.rendering import Photometry
 from soro_lib.sensing.stereo_vision import CORNER_SHIFT, CalibratedCamera
 from soro_lib.studies.findings import Finding
 
+SEED = 7
+"""Seed of the recordings."""
+
 Report = Callable[[int], None]
 """Told how many more pictures have been looked at."""
 

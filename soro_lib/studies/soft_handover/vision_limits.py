@@ -22,6 +22,7 @@ from soro_lib.sensing.handover_scene import (
 )
 from soro_lib.sensing.rendered_observation import ESTIMATORS, HandoverVision, calibrate_on_box
 from soro_lib.sensing.rendering import Image, invert_pose, transform_points
+from soro_lib.sensing.stereo_vision import CalibratedCamera
 from soro_lib.studies.soft_handover.vision import NO_SENSOR_NOISE, Report, ball_before, nothing, random_states
 
 BALL_RULES = {"largest piece": "thesis", "joined pieces": "joint"}
@@ -39,25 +40,17 @@ def occlusion(count: int, seed: int, report: Report = nothing) -> pd.DataFrame:
         pose, rule, visible (the smaller share of the two cameras), ball_{x,y,z}_mm, ball_mm, gap_mm,
         claimed_mm.
     """
-    scene = HandoverScene()
     rows = []
-    for pose, sequence in enumerate(np.random.SeedSequence(seed).spawn(count)):
-        rng = np.random.default_rng(sequence)
-        state = random_states(1, rng)[0]
-        gripper = scene.arm.tip_points(state)[3:]
-        ball = gripper + 0.010 * rng.standard_normal(3) if pose % 2 else ball_before(gripper, rng)
-        cameras = calibrate_on_box(STEREO, rng)
-        items = scene.items(state, ball)
-        pictures = [photograph(items, view, WEBCAM, rng) for view in STEREO]
-        visible = min(visible_share(scene, state, ball, view) for view in STEREO)
+    for pose in range(count):
+        case = hidden_ball(pose, seed)
         for rule, estimator in BALL_RULES.items():
-            seen = HandoverVision(cameras, estimator, track=False).look(pictures).observation
-            error = np.full(3, np.nan) if seen.ball is None else 1e3 * (seen.ball - ball)
+            seen = HandoverVision(case.cameras, estimator, track=False).look(case.pictures).observation
+            error = np.full(3, np.nan) if seen.ball is None else 1e3 * (seen.ball - case.ball)
             rows.append(
                 {
                     "pose": pose,
                     "rule": rule,
-                    "visible": visible,
+                    "visible": case.visible,
                     **{f"ball_{axis}_mm": value for axis, value in zip("xyz", error)},
                     "ball_mm": float(np.linalg.norm(error)),
                     "gap_mm": 1e3 * seen.disagreement,
@@ -66,6 +59,40 @@ def occlusion(count: int, seed: int, report: Report = nothing) -> pd.DataFrame:
             )
         report(1)
     return pd.DataFrame(rows)
+
+
+@dataclass(frozen=True)
+class HiddenBall:
+    """A ball that the gripper may hide in part.
+
+    Attributes
+    ----------
+    ball : ndarray, shape (3,)
+        Its true place [m].
+    cameras : list of CalibratedCamera
+    pictures : list of images
+    visible : float
+        Visible share, the smaller of the cameras.
+    """
+
+    ball: NDArray[np.float64]
+    cameras: list[CalibratedCamera]
+    pictures: list[Image]
+    visible: float
+
+
+def hidden_ball(pose: int, seed: int) -> HiddenBall:
+    """Return one of the balls of :func:`occlusion`; every odd one lies between the fingers."""
+    scene = HandoverScene()
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(pose,)))
+    state = random_states(1, rng)[0]
+    gripper = scene.arm.tip_points(state)[3:]
+    ball = gripper + 0.010 * rng.standard_normal(3) if pose % 2 else ball_before(gripper, rng)
+    cameras = calibrate_on_box(STEREO, rng)
+    items = scene.items(state, ball)
+    pictures = [photograph(items, view, WEBCAM, rng) for view in STEREO]
+    visible = min(visible_share(scene, state, ball, view) for view in STEREO)
+    return HiddenBall(ball, cameras, pictures, visible)
 
 
 def visible_share(
@@ -218,7 +245,7 @@ def degradations(count: int, seed: int, report: Report = nothing) -> pd.DataFram
 
 
 def _looks(
-    cameras: Sequence, pictures: Sequence[Image | None]
+    cameras: Sequence[CalibratedCamera], pictures: Sequence[Image | None]
 ) -> Iterator[tuple[str, HandoverObservation, int]]:
     for estimator in ESTIMATORS:
         look = HandoverVision(cameras, estimator, track=False).look(pictures)
