@@ -55,7 +55,7 @@ REASONS: Mapping[str, str] = {
     "aan_like_full_time": "",
     "aan_like_full_error": "",
     "aan_not_felt": "some experts rest outside th_D long enough to be pushed, more so on the real arm",
-    "aan_shorter_full": "a toss-up: the force comes when the operator already corrects",
+    "aan_shorter_full": "a toss-up person by person; only the mean over many shows a small gain, if any",
     "aan_more_accurate_full": "the item is released before the stiffness has risen, unless the dwell is long",
     "stable": "some naive users hunt against lag and delay until the time limit",
     "expert_faster": "",
@@ -123,7 +123,11 @@ def factorial_findings(trials: pd.DataFrame) -> dict[str, Finding]:
             reason = "cannot be: H is the mean of a force that is capped at 7 N"
         findings[f"effect_{contrast.name}"] = Finding(effect, reason)
         findings[f"f_{contrast.name}"] = Finding(blocked_f(samples), ACTIVE, "median")
-        findings[f"sign_{contrast.name}"] = Finding((np.sign(effect) == contrast.sign).astype(float), ACTIVE)
+        sign = (np.sign(effect) == contrast.sign).astype(float)
+        against = "a higher k_MAX pulls harder, so a lower one cannot assist more"
+        findings[f"sign_{contrast.name}"] = Finding(
+            sign, against if contrast.name == "kmax_assistance" else ACTIVE
+        )
     interaction = interaction_samples(trials, "assistance_n", "xi_c", "xi_s")
     findings["f_interaction"] = Finding(blocked_f(interaction), "", "median")
     findings["sign_interaction"] = Finding(_largest_assistance(trials))

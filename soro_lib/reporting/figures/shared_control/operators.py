@@ -41,8 +41,7 @@ def misdetection(trials: pd.DataFrame) -> Figure:
                     color=PARADIGM_COLORS[str(name)],
                     label=SHORT[str(name)],
                 )
-            label_axes(axes, title=f"{kind}: {label}")
-            axes.title.set_fontsize(8.5)
+            axes.set_title(f"{kind}: {label}", fontsize=8.5)
     for axes in grid[1]:
         label_axes(axes, "error of the goals [mm]")
     legend(figure, ncols=6)

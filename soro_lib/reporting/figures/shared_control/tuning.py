@@ -93,8 +93,8 @@ def passivity(table: pd.DataFrame, printed: Mapping[str, float]) -> Figure:
         axes.axhline(0, color=COLORS["grey"], linewidth=0.8)
         if name == "kmax_assistance":
             axes.axhspan(7, 10, color=COLORS["light"], linewidth=0, label="impossible")
-        label_axes(axes, "passivity ρ", title=label)
-        axes.title.set_fontsize(8)
+        axes.set_title(label, fontsize=8)
+        label_axes(axes, "passivity ρ")
     legend(figure)
     return figure
 
