@@ -60,6 +60,20 @@ def test_calibration_error_grows_with_the_selection_error():
     assert miss(0.1) < miss(1.0) < 0.05
 
 
+def test_calibration_survives_a_bad_linear_start():
+    rng = np.random.default_rng(0)
+    exact = [camera.project(box_corners()) for camera in CAMERAS]
+    astray = 0
+    for number in range(1500):
+        selected = exact[number % 2] + 0.5 * rng.standard_normal((6, 2))
+        _, rotation, translation = cv2.solvePnP(box_corners(), selected, BRIO.matrix, BRIO.coefficients)
+        seen, _ = cv2.projectPoints(box_corners(), rotation, translation, BRIO.matrix, BRIO.coefficients)
+        if np.abs(seen[:, 0] - selected).max() > 10:
+            astray += 1
+            assert calibrate(BRIO, box_corners(), selected).reprojection < 2
+    assert astray > 0, "OpenCV's own start never fails: the second one is not needed any more"
+
+
 @pytest.mark.parametrize(
     ("corners", "pixels", "message"),
     [
