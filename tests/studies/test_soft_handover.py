@@ -163,3 +163,11 @@ def test_findings_fill_the_scorecard():
         card.loc[card["kind"] == "definition", "verdict"].drop(list(vision), errors="ignore") == "reproduced"
     ).all()
     assert findings.claims_on_both(tables)["holds on both"].any()
+
+
+def test_a_ball_opposite_a_tendon_is_slow_on_the_elastic_arm_only():
+    table = variants.reach_by_heading(PLANTS, laterals=(0.12, 0.17), step_limit=60)
+    steps = table.set_index(["plant", "heading_deg", "lateral_mm"])["steps"]
+    assert steps["E", 180.0, 170.0] > 2 * steps["E", 0.0, 170.0]
+    assert steps["E", 180.0, 120.0] <= steps["E", 0.0, 120.0] + 2
+    assert steps["K", 180.0, 170.0] == steps["K", 0.0, 170.0]

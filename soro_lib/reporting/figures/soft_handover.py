@@ -390,6 +390,28 @@ def without_estimation(traces: pd.DataFrame, step_size: float) -> Figure:
     return figure
 
 
+def reach_by_heading(table: pd.DataFrame) -> Figure:
+    """Draw steps over the ball's distance aside, on the side of a tendon and opposite one, one panel per
+    plant."""
+    plants = table["plant"].unique()
+    figure, panels = new_figure(PAGE_WIDTH, 2.8, 1, len(plants), sharey=True)
+    sides = {0.0: ("towards a tendon", "blue", "o"), 180.0: ("opposite a tendon", "vermillion", "s")}
+    for axes, plant in zip(np.atleast_1d(panels), plants):
+        for heading, (label, color, marker) in sides.items():
+            rows = table[(table["plant"] == plant) & (table["heading_deg"] == heading)]
+            axes.plot(rows["lateral_mm"], rows["steps"], color=COLORS[color], zorder=2)
+            for closed, face in ((True, COLORS[color]), (False, "white")):
+                shown = rows[rows["closed"] == closed]
+                if len(shown):
+                    name = label if closed else f"{label}, never reached"
+                    style = {"marker": marker, "color": COLORS[color], "markerfacecolor": face}
+                    axes.plot(shown["lateral_mm"], shown["steps"], linestyle="none", label=name, **style)
+        label_axes(axes, "ball aside [mm]", "steps", title=f"Plant {plant}")
+    np.atleast_1d(panels)[0].set_ylim(bottom=0)
+    legend(figure)
+    return figure
+
+
 def suggestions(runs: pd.DataFrame) -> Figure:
     """Draw steps, final miss and success of the suggested improvements on both plants."""
     figure, panels = new_figure(PAGE_WIDTH, 4.6, 1, 3, width_ratios=[2, 2, 1])

@@ -202,7 +202,7 @@ CLAIM_REASONS = {
 
 TIME_REASONS = {
     "K": "steps times the thesis's timestep; a smooth plant without friction or creep spreads less",
-    "E": "steps times the thesis's timestep; slow runs wind up the command before slack tendons take hold",
+    "E": "steps times the thesis's timestep; slow: balls opposite a tendon, where a slack one gives way",
 }
 """Why the times come out as they do."""
 
@@ -230,6 +230,13 @@ def time_findings(tables: HandoverTables, timestep: Mapping[float, float]) -> di
     return result
 
 
+DISTANCE_REASONS = {
+    "K": "plant K was fitted without noise",
+    "E": "runs to balls opposite a tendon wind the command up and raise the mean",
+}
+"""Why the distances come out as they do."""
+
+
 def distance_findings(tables: HandoverTables) -> dict[str, Finding]:
     """Return the final distances of Section 5.2 on both plants, per block [cm]."""
     result = {}
@@ -247,7 +254,7 @@ def distance_findings(tables: HandoverTables) -> dict[str, Finding]:
             ("commanded_distance", "commanded_mm"),
             ("gap", "commanded_gap_mm"),
         ):
-            result[f"s52_{name}{suffix}"] = Finding(last[column] / 10)
+            result[f"s52_{name}{suffix}"] = Finding(last[column] / 10, DISTANCE_REASONS[plant])
     return result
 
 
