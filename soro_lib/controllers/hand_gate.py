@@ -29,7 +29,8 @@ class GateSettings:
     reset_after : float
         Pause after which filters start anew [s].
     predict_for : float
-        How long a lost hand is extrapolated [s]; afterwards it is held.
+        How long a lost hand is extrapolated [s]; afterwards it is held. As long, a palm that jumped is taken for
+        another hand and ignored.
     velocity_after : int
         Frames of a new track before its velocity is believed [-].
     """
@@ -112,8 +113,16 @@ class HandGate:
             return GatedHand(False, f"palm normal has length {length:.3g}")
         if not self.mapping.in_box(sample.palm):
             return GatedHand(False, "palm is outside the allowed box")
+        if self._is_other_hand(sample):
+            return GatedHand(False, "another hand")
         x, y, z = sample.normal
         return self._passed(sample, (x / length, y / length, z / length))
+
+    def _is_other_hand(self, sample: HandSample) -> bool:
+        """Return whether the palm jumped while the hand that is followed was seen a moment ago."""
+        if self._palm is None or sample.time - self._valid_time > self.settings.predict_for:
+            return False
+        return math.dist(sample.palm, self._palm) > self.settings.largest_jump
 
     def _passed(self, sample: HandSample, normal: Vector) -> GatedHand:
         restart = (

@@ -6,7 +6,9 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     __name__,
     submod_attrs={
         "fibre": ["FibreGratings"],
-        "hand_tracking": ["load_hand_recording"],
+        "hand_tracking": ["HandSample", "hand_samples", "load_hand_recording"],
+        "monocular_vision": ["MonocularTracker", "fit_similarity"],
+        "rendering": ["Camera", "Photometry", "Polygon", "Sphere", "TexturedQuad", "expose", "render"],
         "stereo_vision": ["triangulate"],
     },
 )

@@ -51,7 +51,7 @@ def check_sound(results, settings=None):
         assert (result.actuation <= ARM.upper).all()
         assert np.isfinite(result.tip).all()
         assert bool(result.reason) != result.converged
-    assert tip_speeds(results).max() <= settings.tip_speed * (1 + 1e-6)
+    assert (tip_speeds(results) <= settings.tip_speed * (1 + 1e-6)).all()
     for first, second in pairwise(results):
         if second.time > first.time:
             most = settings.cable_rate * min(second.time - first.time, settings.longest_interval)
@@ -135,7 +135,7 @@ def test_solver_failure_keeps_the_command(monkeypatch):
     before, time = held(steering, FLAT, 1.0, 0.0)
     failed = Step(np.zeros(7), False, "daqp stopped with flag -4")
     monkeypatch.setattr("soro_lib.controllers.gesture_steering.solve", lambda problem: failed)
-    after = steering.update(replace(FLAT, time=time, palm=(0.1, 0.2, 0.0)))
+    after = steering.update(replace(FLAT, time=time, palm=(0.05, 0.2, 0.0)))
     assert not after.converged
     assert after.reason == "daqp stopped with flag -4"
     np.testing.assert_array_equal(after.actuation, before.actuation)
@@ -211,8 +211,8 @@ def test_every_fault_is_recovered_from(sound_samples):
     table = robustness.robustness_table(sound_samples).set_index("fault")
     assert (table["recovery_ms"] < 1000.0).all()
     assert table["finite"].all()
-    for fault in ("gesture flicker, 60 ms", "palm flip, 30 ms", "repeated time stamps"):
-        assert table.loc[fault, "deviation_mm"] < 0.5
+    for fault in ("gesture flicker, 60 ms", "palm flip, 30 ms", "repeated time stamps", "second hand, 30 ms"):
+        assert table.loc[fault, "deviation_mm"] < (2.0 if fault.startswith("second") else 0.5)
 
 
 values = st.one_of(st.floats(-0.5, 0.5), st.sampled_from([math.nan, math.inf, -math.inf, 1e9]))
@@ -237,6 +237,15 @@ def test_any_stream_whatever_gives_valid_commands(stream):
         assert np.isfinite(result.actuation).all()
         assert (result.actuation >= ARM.lower).all()
         assert (result.actuation <= ARM.upper).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(samples, max_size=25), st.lists(st.floats(1e-4, 0.3), min_size=25, max_size=25))
+def test_any_stream_whatever_keeps_the_tip_within_its_speed(stream, intervals):
+    steering = GestureSteering(ARM)
+    times = np.cumsum(intervals)
+    timed = [replace(sample, time=float(time)) for sample, time in zip(stream, times)]
+    check_sound([steering.update(sample) for sample in (FLAT, *timed)])
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the real recordings are not here")

@@ -63,12 +63,23 @@ def test_nearly_unit_normals_are_renormalised():
     assert hand.normal == pytest.approx((0.0, -1.0, 0.0))
 
 
-@pytest.mark.parametrize("changes", [{"hand_id": 2}, {"palm": (0.08, 0.2, 0.0)}])
-def test_another_hand_starts_anew(changes):
-    _, hand = tracked(**changes)
+def test_a_new_identity_starts_anew():
+    _, hand = tracked(hand_id=2)
     assert hand.valid
     assert hand.restart
     assert hand.velocity is None
+
+
+def test_a_second_hand_is_ignored_until_the_first_has_been_gone_for_a_moment():
+    gate, hand = tracked(hand_id=2, palm=(0.08, 0.2, 0.0))
+    assert hand.reason == "another hand"
+    assert gate.update(replace(FLAT, time=11 * PERIOD)).valid
+    for index in range(12, 17):
+        hand = gate.update(replace(FLAT, time=index * PERIOD, hand_id=2, palm=(0.08, 0.2, 0.0)))
+        assert hand.reason == "another hand"
+    hand = gate.update(replace(FLAT, time=17 * PERIOD, hand_id=2, palm=(0.08, 0.2, 0.0)))
+    assert hand.valid
+    assert hand.restart
 
 
 def test_a_long_pause_starts_anew():

@@ -56,7 +56,7 @@ def fig10_hover_and_paths(measured: pd.DataFrame) -> Figure:
 
 
 def fig11_configurations(actuations: list[Array], sim: Array, exp: Array) -> Figure:
-    """Draw the four configurations of Table II from the front and from the side [mm], with the printed points."""
+    """Draw the four configurations of Table II from the front and the side [mm], with the printed points."""
     arm = CableDrivenArm()
     figure, axes = new_figure(PAGE_WIDTH, 4.3, columns=8, sharey=True)
     for index, panel in enumerate(axes):
