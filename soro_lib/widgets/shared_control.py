@@ -7,6 +7,7 @@ busy browser delays a trial but cannot change it, and the recorded commands repl
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ from soro_lib.project import data_directory, trials_directory
 from soro_lib.reporting import as_image
 from soro_lib.reporting.figures.shared_control import fig02_task
 from soro_lib.robots.soft_growing_plant import NOTHING, SAMPLE_TIME, nearest_item
-from soro_lib.studies.shared_control.recorder import TrialRecorder, recordable, sample_line
+from soro_lib.studies.shared_control.recorder import TrialRecorder, next_number, recordable, sample_line
 from soro_lib.studies.shared_control.simulation import METRICS, TIME_LIMIT, trial_metrics
 from soro_lib.studies.shared_control.trials import TrialHeader, load_trials
 from soro_lib.widgets.frontend import is_live
@@ -154,14 +155,16 @@ class DrivenTrial:
     def advance(self, batch: Sequence[Any]) -> None:
         """Let the task run up to the last input of a batch; each input holds until the next one.
 
-        Inputs that are not six finite numbers, do not follow the last one, or follow it after more than
-        `LONGEST_GAP` are skipped and counted.
+        A trial that is over stays as it is. Inputs that are not six finite numbers, do not follow the last
+        one, or follow it after more than `LONGEST_GAP` are skipped and counted.
 
         Raises
         ------
         OSError
             If the recording cannot be written.
         """
+        if not self.under_way:
+            return
         lines: list[str] = []
         for values in batch:
             given = Input.parse(values)
@@ -188,11 +191,12 @@ class DrivenTrial:
         item = self.task.state.goal.item
         return sample_line(sample, now.aim, self.command, now.closed, now.confirmed, item)
 
-    def stop(self) -> None:
+    def stop(self, status: str = "stopped") -> None:
         """Leave the trial; its recording stays, marked as cut off."""
         if self.under_way:
-            self.status = "stopped"
-            self.recorder.close()
+            self.status = status
+            with suppress(OSError):
+                self.recorder.close()
 
     def metrics(self) -> dict[str, float | None]:
         """The metrics so far, `METRICS`; None for what is not yet known."""
@@ -249,7 +253,7 @@ class OperatorExplorer(ipywidgets.VBox):
     operator : str
         Name that stands in the recordings.
     seed : int
-        With the number of the trial it seeds what the real arm leaves to chance.
+        With the number of the trial in the folder it seeds what the real arm leaves to chance.
 
     Attributes
     ----------
@@ -293,12 +297,11 @@ class OperatorExplorer(ipywidgets.VBox):
             elif kind == "stop":
                 self.stop()
             elif kind == "inputs" and self.trial and message.get("run") == self.runs:
-                if self.trial.under_way:
-                    self.trial.advance(message.get("inputs", []))
+                self.trial.advance(message.get("inputs", []))
                 self._show(seq=message.get("seq"))
         except OSError as error:
-            if self.trial:
-                self.trial.status = "failed"
+            if self.trial and self.trial.under_way:
+                self.trial.stop("failed")
             self._show(message=f"the trial cannot be recorded: {error}")
 
     def start(self) -> DrivenTrial:
@@ -316,7 +319,7 @@ class OperatorExplorer(ipywidgets.VBox):
             self.environment.value,
             operator=self.operator,
             force_law=self.law.value,
-            seed=(self.seed, self.runs),
+            seed=(self.seed, next_number(self.folder)),
             hand_stiffness=float(self.stiffness.value),
         )
         self.trial = DrivenTrial(self.folder, header)

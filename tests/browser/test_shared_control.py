@@ -112,7 +112,8 @@ def test_whole_trial_by_pointer_wheel_and_keys(open_notebook, tmp_path):
 
     metrics = trial.metrics()
     shown = {
-        cell.get_attribute("data-metric"): cell.text_content() for cell in page.locator(f"{ROOT} [data-metric]").all()
+        cell.get_attribute("data-metric"): cell.text_content()
+        for cell in page.locator(f"{ROOT} [data-metric]").all()
     }
     assert set(shown) == {"time_s", "path_m", "assistance_n", "item1_error_mm", "item2_error_mm"}
     for name, text in shown.items():

@@ -30,6 +30,12 @@ def recordable(command: Sequence[float]) -> Vector:
     return (x, y, z)
 
 
+def next_number(folder: Path) -> int:
+    """The number that the next trial recorded to a folder will bear."""
+    taken = [path.name.partition("_")[0] for path in folder.iterdir()] if folder.is_dir() else []
+    return max((int(name) for name in taken if name.isdigit()), default=0) + 1
+
+
 class TrialRecorder:
     """A trial file under way: ``<name>.csv.part``, which `finish` turns into ``<name>.csv``.
 
@@ -61,8 +67,7 @@ class TrialRecorder:
 
     def _create(self, folder: Path) -> TextIO:
         """Open a file with the next free number."""
-        taken = [path.name.partition("_")[0] for path in folder.iterdir()]
-        number = max((int(name) for name in taken if name.isdigit()), default=0) + 1
+        number = next_number(folder)
         while True:
             name = f"{number:04d}_{self.header.paradigm}_{self.header.environment}.csv.part"
             try:

@@ -17,7 +17,8 @@ from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.datacards import verified
 from soro_lib.operators import EXPERT, NAIVE
 from soro_lib.project import data_directory
-from soro_lib.studies.shared_control.demonstrations import summary
+from soro_lib.reporting.figures import shared_control as figures
+from soro_lib.studies.shared_control.demonstrations import run_demonstrations, summary
 from soro_lib.studies.shared_control.metrics import mean_assistance
 from soro_lib.studies.shared_control.recorder import (
     SHIPPED,
@@ -416,3 +417,41 @@ def test_files_may_be_moved_and_copied(shipped, tmp_path):
     for trial in shipped[:2]:
         shutil.copy(trial.path, tmp_path / f"mine-{trial.path.name}")
     assert len(load_trials(tmp_path)) == 2
+
+
+# --- Figures ----------------------------------------------------------------------------------------------
+
+
+def stars(axes):
+    """Values of the driven trials drawn into an axes."""
+    lines = [line for line in axes.lines if line.get_marker() == "*"]
+    return sorted(float(value) for line in lines for value in line.get_ydata())
+
+
+def test_driven_trials_are_drawn_where_they_belong(shipped):
+    crowd = run_demonstrations(2, 1, trials=1)
+    own = trial_table(shipped)
+    figure = figures.fig07b_time(crowd, own)
+    for axes in figure.axes:
+        kind, environment = axes.get_title(loc="left").split(", ")
+        fits = own[(own["kind"] == kind) & (own["environment"] == environment)]
+        assert stars(axes) == sorted(fits["time_s"])
+    anonymous = figures.fig07b_time(crowd, own.assign(kind="own"))
+    assert [len(stars(axes)) for axes in anonymous.axes] == [6, 6, 2, 2], "both panels of the environment"
+    unfinished = figures.fig09_assistance(crowd, own.assign(finished=0.0))
+    assert stars(unfinished.axes[0]) == []
+    assert len(stars(figures.fig09_assistance(crowd, own).axes[0])) == 3
+    assert sum(len(stars(axes)) for axes in figures.fig08_error_against_time(crowd, own).axes) == 16
+
+
+@pytest.mark.parametrize("count", [1, 3, 8])
+def test_any_folder_of_trials_makes_every_figure(shipped, count):
+    table = trial_table(shipped[:count])
+    panels = table.groupby(["environment", "kind"]).ngroups
+    assert len(figures.fig07a_placement_error(table).axes) == panels
+    assert len(figures.fig07b_time(table).axes) == panels
+    assert sum(axes.get_visible() for axes in figures.fig08_error_against_time(table).axes) == panels
+    guided = table["paradigm"].isin(["assist_as_needed", "fixed_assistance"]).sum()
+    assert len(figures.fig09_assistance(table).axes[0].get_xticklabels()) >= guided
+    assert len(figures.fig05_stiffness_machine({"a": shipped[1].trace}).axes) == 3
+    assert figures.fig04_goal_machine(shipped[5].trace).axes

@@ -116,7 +116,9 @@ def fig04_goal_machine(trace: pd.DataFrame) -> Figure:
 
 def fig05_stiffness_machine(traces: Mapping[str, pd.DataFrame]) -> Figure:
     """Assist-as-needed at work (Fig. 5): distance, stiffness and force of one trial per operator."""
-    figure, grid = new_figure(height=4.6, rows=3, columns=len(traces), sharex="col", sharey="row")
+    figure, grid = new_figure(
+        height=4.6, rows=3, columns=len(traces), sharex="col", sharey="row", squeeze=False
+    )
     for (label, trace), column in zip(traces.items(), grid.T, strict=True):
         time = trace["time_s"]
         for axes in column:
