@@ -207,7 +207,7 @@ class TexturedQuad:
         """Paint the quad into ``image``, in place."""
         corners = transform_points(world_in_camera, self.corners)
         right, down = self._edges(corners)
-        if np.cross(right, down) @ corners[0] <= 0:
+        if np.linalg.det(np.array([right, down, corners[0]])) <= 0:  # seen from behind
             return
         outline = camera.clip(corners)
         if len(outline) < 3 or (camera.distortion and not camera.sees(corners)):

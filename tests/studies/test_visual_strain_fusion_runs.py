@@ -77,7 +77,7 @@ def test_ten_seconds_without_the_camera_cost_the_fusion_little(motion):
     assert away["camera_mm"].max() > 15
     assert away["fused_mm"].mean() < 5
     assert run["fused_mm"].iloc[-50:].max() < 2.5
-    assert np.isfinite(run.drop(columns="fibre_sd_mm")).all(axis=None)
+    assert np.isfinite(run.drop(columns=["fibre_sd_mm", "weighted_error_px"])).all(axis=None)
 
 
 def test_a_flight_without_any_camera_stays_finite(motion):
@@ -111,6 +111,16 @@ def test_findings_answer_published_ids_and_nothing_else(runs, motion):
     ours = {row for row in ids if row.startswith(("s4b_", "s4c1_", "s4c2_"))}
     assert ours == set(findings)
     assert all(isinstance(finding, Finding) and np.isfinite(finding.value) for finding in findings.values())
+
+
+def test_the_sweep_of_bounds_contains_the_run_itself(runs, obstacles):
+    table = fusion.bounds_sweep(runs, lower=(fusion.SETTINGS.lower,), width=(1.2, 12.0))
+    row = table[
+        (table["flight"] == "scene1_obstacles") & np.isclose(table["upper_px"], fusion.SETTINGS.upper)
+    ]
+    disturbed = obstacles.loc[obstacles["phase"] > 1, "fused_mm"]
+    assert row["mean_mm"].item() == pytest.approx(disturbed.mean(), abs=1e-4)
+    assert row["max_mm"].item() == pytest.approx(disturbed.max(), abs=1e-4)
 
 
 def test_the_signs_of_trouble_are_ranked():

@@ -5,6 +5,7 @@ wavelength noise. Four estimates stand side by side: the camera alone, the fibre
 reprojection error as printed and with it weighted by the inliers, and a gated inverse-variance filter.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -112,7 +113,8 @@ def fuse_flight(
     Returns
     -------
     DataFrame
-        Per frame: time_s, phase, tracked, step_mm, weight (of the fibre), printed_weight; for every estimate
+        Per frame: time_s, phase, tracked, step_mm, weighted_error_px (what the inlier-weighted reading acts
+        on), weight (of the fibre), printed_weight; for every estimate
         of :data:`ESTIMATES` ``<name>_x_mm``, ``_y_mm``, ``_z_mm``, ``<name>_qx`` ... ``_qw`` and
         ``<name>_mm`` (distance from the truth); fibre_sd_mm, and the squared Mahalanobis distances of the
         filter's error in its own covariance (filter_distance) and in that plus the drift of the map
@@ -155,12 +157,14 @@ def fuse_flight(
         "phase": frames["phase"].to_numpy(),
         "tracked": 1 - lost,
         "step_mm": 1e3 * np.linalg.norm(np.diff(truth[:, :3], axis=0, prepend=truth[:1, :3]), axis=1),
+        "weighted_error_px": weighted,
         "weight": fibre_weight(weighted, settings.lower, settings.upper),
         "printed_weight": fibre_weight(printed_error, **PRINTED_BOUNDS),
         "fibre_sd_mm": 1e3 * np.sqrt(fibre_variance),
         "filter_distance": _squared_distance(filter_error, covariance),
         "filter_drift_distance": _squared_distance(filter_error, covariance + CAMERA_BIAS**2 * np.eye(3)),
     }
+    run |= dict(zip(TRUE, flown.T))
     for name, pose in poses.items():
         run |= {f"{name}_{axis}_mm": 1e3 * pose[:, index] for index, axis in enumerate("xyz")}
         run |= {f"{name}_{axis}": pose[:, 3 + index] for index, axis in enumerate(("qx", "qy", "qz", "qw"))}
@@ -334,6 +338,43 @@ def fusion_table(errors: pd.DataFrame, statistic: str = "mean_mm") -> pd.DataFra
     ]
     table = pd.Series(text, index=middle.index).unstack("estimate", sort=False)
     return table[list(ESTIMATES)].reset_index()
+
+
+def bounds_sweep(
+    runs: pd.DataFrame,
+    lower: Sequence[float] = (0.8, 1.0, 1.2, 1.4, 1.6),
+    width: Sequence[float] = (0.4, 1.2, 2.4),
+) -> pd.DataFrame:
+    """Return what other bounds E_L and E_U = E_L + width would have given, learning left as it was.
+
+    Parameters
+    ----------
+    runs : DataFrame
+        As from :func:`fuse_flights`.
+    lower, width : sequence of float, optional
+        Bounds of the inlier-weighted reading [px].
+
+    Returns
+    -------
+    DataFrame
+        Columns flight, lower_px, upper_px, and mean_mm and max_mm with a hand in view or under cover, averaged
+        over fibres.
+    """
+    disturbed = runs[runs["phase"] > 1]
+    camera, fibre = (
+        disturbed[[f"{name}_{axis}" for axis in SEEN]].to_numpy() for name in ("camera", "fibre")
+    )
+    truth = disturbed[list(TRUE)].to_numpy()
+    tables = []
+    for low, extra in itertools.product(lower, width):
+        weight = fibre_weight(disturbed["weighted_error_px"], low, low + extra)[:, None]
+        error = np.linalg.norm(weight * fibre + (1 - weight) * camera - truth, axis=1)
+        by_fibre = disturbed[["flight", "fibre_number"]].assign(error=error)
+        grouped = by_fibre.groupby(["flight", "fibre_number"])["error"]
+        table = grouped.agg(mean_mm="mean", max_mm="max").groupby("flight", sort=False).mean()
+        tables.append(table.reset_index().assign(lower_px=low, upper_px=low + extra))
+    columns = ["flight", "lower_px", "upper_px", "mean_mm", "max_mm"]
+    return pd.concat(tables).sort_values(columns[:3])[columns].reset_index(drop=True)
 
 
 def coverage(runs: pd.DataFrame, probability: float = 0.95) -> pd.DataFrame:
