@@ -117,8 +117,8 @@ def _corner_pose(
 ) -> NDArray[np.float64]:
     """Return ``world_in_camera`` (4, 4) by least squares, from OpenCV's own start or another method's.
 
-    Its own is a linear solution, which on six corners of a box with ordinary selection errors leads astray
-    about twice in a thousand.
+    Its own is a linear solution, which on six corners of a box with ordinary selection errors can lead
+    astray: six times in a thousand for the camera at the side.
     """
     intrinsic = camera.matrix, camera.coefficients
     if start is None:

@@ -62,10 +62,10 @@ def test_calibration_error_grows_with_the_selection_error():
 
 def test_calibration_survives_a_bad_linear_start():
     rng = np.random.default_rng(0)
-    exact = [camera.project(box_corners()) for camera in CAMERAS]
+    exact = CalibratedCamera(SIDE_CAMERA.camera, SIDE_CAMERA.pose).project(box_corners())
     astray = 0
-    for number in range(1500):
-        selected = exact[number % 2] + 0.5 * rng.standard_normal((6, 2))
+    for _ in range(1000):
+        selected = exact + 0.5 * rng.standard_normal((6, 2))
         _, rotation, translation = cv2.solvePnP(box_corners(), selected, BRIO.matrix, BRIO.coefficients)
         seen, _ = cv2.projectPoints(box_corners(), rotation, translation, BRIO.matrix, BRIO.coefficients)
         if np.abs(seen[:, 0] - selected).max() > 10:
