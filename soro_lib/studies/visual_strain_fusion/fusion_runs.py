@@ -47,6 +47,9 @@ SEEN = ("x_mm", "y_mm", "z_mm")
 TRUE = ("true_x_mm", "true_y_mm", "true_z_mm")
 """Columns of a flight: tip position by the camera, and the true one."""
 
+PARTS = ("camera", "fibre")
+"""The estimates that Eq. (18) blends."""
+
 Windows = dict[str, Callable[[pd.DataFrame], pd.Series]]
 """Parts of a run: masks of its frames, by name."""
 
