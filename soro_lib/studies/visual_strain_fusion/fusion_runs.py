@@ -360,8 +360,8 @@ def bounds_sweep(
     Returns
     -------
     DataFrame
-        Columns flight, lower_px, upper_px, and mean_mm and max_mm with a hand in view or under cover, averaged
-        over fibres.
+        Columns flight, lower_px, upper_px, and mean_mm and max_mm of the disturbed frames, averaged over
+        fibres.
     """
     disturbed = runs[runs["phase"] > 1]
     camera, fibre = (
