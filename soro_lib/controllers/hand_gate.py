@@ -29,8 +29,8 @@ class GateSettings:
     reset_after : float
         Pause after which filters start anew [s].
     predict_for : float
-        How long a lost hand is extrapolated [s]; afterwards it is held. As long, a palm that jumped is taken for
-        another hand and ignored.
+        How long a lost hand is extrapolated [s]; afterwards it is held. For as long, a palm that jumped is
+        taken for another hand and ignored.
     velocity_after : int
         Frames of a new track before its velocity is believed [-].
     """
