@@ -198,27 +198,29 @@ def learning_against_no_learning(summary: pd.DataFrame, rng: np.random.Generator
     Returns
     -------
     pandas.DataFrame
-        One row per path and gain: mean errors [mm] of the model, of the compensator and of the quadratic gain
-        without learning, the paired difference compensator minus no learning with its 95 % interval, and the
-        share of the improvement over the model that the gain alone has.
+        One row per measure (tracking error, path deviation), path and gain: means [mm] of the model, of the
+        compensator and of the quadratic gain without learning, the paired difference compensator minus no
+        learning with its 95 % interval, and the share of the improvement that the gain alone has [%].
     """
     rows = []
-    for (path, gain), group in summary.groupby(["path", "gain"], sort=False):
-        wide = group.pivot(index="seed", columns="controller", values="error_mm")
-        difference = wide["literal"] - wide["no learning"]
-        low, high = interval(difference.tolist(), rng)
-        rows.append(
-            {
-                "path": path,
-                "gain": gain,
-                "model_mm": wide["model"].mean(),
-                "with_learning_mm": wide["literal"].mean(),
-                "no_learning_mm": wide["no learning"].mean(),
-                "difference_mm": difference.mean(),
-                "difference_low_mm": low,
-                "difference_high_mm": high,
-                "gain_alone_percent": 100.0
-                * ((wide["model"] - wide["no learning"]) / (wide["model"] - wide["literal"])).mean(),
-            }
-        )
+    for measure in ("error", "deviation"):
+        for (path, gain), group in summary.groupby(["path", "gain"], sort=False):
+            wide = group.pivot(index="seed", columns="controller", values=f"{measure}_mm")
+            difference = wide["literal"] - wide["no learning"]
+            low, high = interval(difference.tolist(), rng)
+            gained = (wide["model"] - wide["no learning"]) / (wide["model"] - wide["literal"])
+            rows.append(
+                {
+                    "measure": measure,
+                    "path": path,
+                    "gain": gain,
+                    "model_mm": wide["model"].mean(),
+                    "with_learning_mm": wide["literal"].mean(),
+                    "no_learning_mm": wide["no learning"].mean(),
+                    "difference_mm": difference.mean(),
+                    "difference_low_mm": low,
+                    "difference_high_mm": high,
+                    "gain_alone_percent": 100.0 * gained.mean(),
+                }
+            )
     return pd.DataFrame(rows)
