@@ -42,8 +42,8 @@ def fibre_weight(reprojection_error: ArrayLike, lower: float, upper: float) -> A
 def inlier_weighted_error(reprojection_error: ArrayLike, inliers: ArrayLike, nominal: float = 200.0) -> Array:
     """Reprojection error raised where few features support the pose: ``e_S max(1, sqrt(nominal / n))`` [px].
 
-    The mean error of the inliers alone says little about the error of the pose, because a pose from few features
-    fits those few well. No inlier at all gives infinity.
+    The mean error of the inliers alone says little about the error of the pose, because a pose from few
+    features fits those few well. No inlier at all gives infinity.
     """
     inliers = np.asarray(inliers, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
