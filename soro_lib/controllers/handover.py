@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
 from soro_lib.estimators.handover_filters import APPENDIX_A, FilterParameters, HandoverFilters
 from soro_lib.estimators.shape_estimation import POSE_WEIGHTS, ShapeEstimate, estimate_shape
+from soro_lib.robots.helix_kernels import tip_points
 from soro_lib.robots.helix_plant import TendonMotors
 from soro_lib.sensing.handover_observation import HandoverObservation
 
@@ -268,7 +269,8 @@ class HandoverController:
         if not estimate.converged:
             return self._hold(f"state estimation: {estimate.reason}")
         step = self.parameters.control.update(self.q_sys, estimate.q, goal, measured)
-        self._expected_move = self.arm.tip_points(step.q_est) - self.arm.tip_points(estimate.q)
+        length = self.arm.gripper_length
+        self._expected_move = tip_points(step.q_est, length) - tip_points(estimate.q, length)
         self.q_sys = step.q_sys
         self._held = 0
         self.mode = self._task_mode

@@ -119,6 +119,13 @@ def tip_points_and_jacobian(q: Array, gripper_length: float) -> tuple[Array, Arr
 
 
 @njit(cache=True)
+def tip_points(q: Array, gripper_length: float) -> Array:
+    """Return wrist and gripper (6,) at the state q (9,), in `arm_base` [m]."""
+    points, _ = tip_points_and_jacobian(q, gripper_length)
+    return points
+
+
+@njit(cache=True)
 def rotate(frame: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return frame @ (x, y, z) as three numbers."""
     return (

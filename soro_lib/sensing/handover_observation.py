@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from soro_lib.project import data_directory
 from soro_lib.robots.helix import HelixArm
+from soro_lib.robots.helix_kernels import tip_points
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,7 @@ class NoisyObserver:
         self, state: NDArray[np.float64], ball: NDArray[np.float64], rng: np.random.Generator
     ) -> HandoverObservation:
         """Return what is seen of the true state q (9,) and the true ball (3,) [m]."""
-        points = self.arm.tip_points(state)
+        points = tip_points(state, self.arm.gripper_length)
         wrist = points[:3]
         direction = (points[3:] - wrist) / self.arm.gripper_length
         noise = self.noise

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from soro_lib.controllers.handover import UP, HandoverController, HandoverParameters, Mode
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
+from soro_lib.robots.helix_kernels import tip_points
 from soro_lib.robots.helix_plant import Gripper, Hand, HelixPlant
 from soro_lib.sensing.handover_observation import Observer
 
@@ -165,12 +166,12 @@ def run_handover(
         sway = sway + scene.sway * np.sqrt(1 - scene.sway_memory**2) * rng.standard_normal(3)
         held_ball = ball + sway
         command = controller.update(observer.observe(state, held_ball, rng))
-        points = arm.tip_points(state)
+        points = tip_points(state, arm.gripper_length)
         miss = float(np.linalg.norm(points[3:] - held_ball))
         overshoot = max(overshoot, float((points[3:5] - held_ball[:2]) @ away))
-        commanded = arm.tip_points(command.q_sys)[3:]
+        commanded = tip_points(command.q_sys, arm.gripper_length)[3:]
         q_est = np.full(9, np.nan) if command.q_est is None else command.q_est
-        estimated = np.full(3, np.nan) if command.q_est is None else arm.tip_points(q_est)[3:]
+        estimated = np.full(3, np.nan) if command.q_est is None else tip_points(q_est, arm.gripper_length)[3:]
         shapes.append((state, command.q_sys, q_est))
         measured = command.measured_points[3:]
         rows.append(
