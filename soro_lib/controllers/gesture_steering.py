@@ -175,8 +175,9 @@ class GestureSteering:
     Examples
     --------
     >>> steering = GestureSteering(CableDrivenArm())
-    >>> flat = HandSample(time=0.0, hand_id=1, palm=(0.0, 0.2, 0.0), normal=(0.0, -1.0, 0.0), fingers=(True,)
-    * 5) >>> steering.update(flat).mode.value 'palm'
+    >>> palm, normal = (0.0, 0.2, 0.0), (0.0, -1.0, 0.0)
+    >>> steering.update(HandSample(0.0, 1, palm, normal, fingers=(True,) * 5)).mode.value
+    'palm'
     """
 
     def __init__(
