@@ -162,8 +162,8 @@ def check(path: Path) -> list[str]:
     """What is wrong with the stored optimum; nothing if it is reproduced and no neighbour is much better.
 
     Neighbours are the optimum with one parameter moved by 2 % of its search range, either way. The misfit may
-    be off by 0.01 and a tenth: without the cap the loop is not stable, and then the last digit of a computer's
-    sine decides where the tip goes.
+    be off by 0.01 and a tenth: without the cap the loop is not stable, and then the last digit of a sine
+    decides where the tip goes.
     """
     problems = []
     for name, (optimum, stored) in read(path).items():

@@ -1,8 +1,8 @@
 """Pushes and flicks: camera and fibre disturbed at once (Wang et al., Sec. IV-F and Appendix).
 
 Stated causes, no injected error. A force bends the backbone away from the shapes that the network was
-trained on: the fibre sees the true curvature, but the network extrapolates. A finger on the body presses
-on the gratings under it, by the shifts of Table VII. A fast motion blurs the image until the features are lost
+trained on: the fibre sees the true curvature, but the network extrapolates. A finger on the body presses on
+the gratings under it, by the shifts of Table VII. A fast motion blurs the image until the features are lost
 and the camera holds its last pose.
 
 Calibrated: the force of the push (15 mm at the tip) and the squeeze of a grating (Table VII). Assumed: shape,
