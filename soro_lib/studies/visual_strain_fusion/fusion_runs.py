@@ -12,11 +12,16 @@ import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, mannwhitneyu
 from threadpoolctl import threadpool_limits
 
 from soro_lib.estimators.extreme_learning_machine import ExtremeLearningMachine
-from soro_lib.estimators.pose_fusion import InverseVarianceFusion, fibre_weight, fuse_poses
+from soro_lib.estimators.pose_fusion import (
+    InverseVarianceFusion,
+    fibre_weight,
+    fuse_poses,
+    inlier_weighted_error,
+)
 from soro_lib.estimators.visual_strain import VisualStrainEstimator, VisualStrainSettings
 from soro_lib.sensing.monocular_vision import fit_similarity
 from soro_lib.studies.findings import Finding
@@ -394,20 +399,37 @@ def coverage(runs: pd.DataFrame, probability: float = 0.95) -> pd.DataFrame:
 
 
 def error_against_confidence(name: str) -> pd.DataFrame:
-    """Return Spearman's correlation of the camera's error with what it says itself; tracked frames only."""
+    """Return how well the camera's own signs of trouble follow its error; tracked frames only.
+
+    Parameters
+    ----------
+    name : str
+        Flight.
+
+    Returns
+    -------
+    DataFrame
+        Columns sign, rank_correlation (Spearman's, with the error) and finds_worst: the probability that the
+        sign is larger in one of the worst hundredth of the frames than in another one; 0.5 is chance.
+    """
     frames = load_flight(name)
     frames = frames.assign(error=np.linalg.norm(camera_errors(frames), axis=1))
     tracked = frames[frames["tracked"] > 0]
-    weighted = tracked["match_error_px"] * np.sqrt(np.maximum(1, 200 / tracked["inliers"]))
     signs = {
         "mean error of the inliers (printed e_S)": tracked["inlier_error_px"],
         "mean error of all matches": tracked["match_error_px"],
-        "inlier-weighted error": weighted,
+        "inlier-weighted error": inlier_weighted_error(tracked["match_error_px"], tracked["inliers"]),
         "fewer inliers": -tracked["inliers"],
         "spread by the Jacobian": tracked["spread_mm"],
     }
-    correlation = [tracked["error"].corr(sign, method="spearman") for sign in signs.values()]
-    return pd.DataFrame({"sign": list(signs), "rank_correlation": correlation})
+    table = pd.DataFrame({sign: np.asarray(values) for sign, values in signs.items()})
+    error = pd.Series(tracked["error"].to_numpy())
+    worst = error >= error.quantile(0.99)
+    larger = mannwhitneyu(table[worst], table[~worst]).statistic / (worst.sum() * (~worst).sum())
+    correlation = table.corrwith(error, method="spearman")
+    return pd.DataFrame(
+        {"sign": list(signs), "rank_correlation": correlation.to_numpy(), "finds_worst": larger}
+    )
 
 
 REASONS = {
