@@ -17,7 +17,7 @@ from soro_lib.sensing.synthetic_hand import synthetic_recording, wandering
 
 Array = NDArray[np.float64]
 Samples = list[HandSample]
-Fault = Callable[[Samples, float], Samples]
+Fault = Callable[[Samples], Samples]
 
 EVERY = 4.0
 """Time from one fault to the next [s]."""
@@ -30,7 +30,7 @@ def bursts(samples: Sequence[HandSample], lasting: float) -> NDArray[np.bool_]:
 
 
 def _within(change: Callable[[HandSample], HandSample], lasting: float) -> Fault:
-    def fault(samples: Samples, _: float) -> Samples:
+    def fault(samples: Samples) -> Samples:
         hit = bursts(samples, lasting)
         return [change(sample) if struck else sample for sample, struck in zip(samples, hit)]
 
@@ -40,7 +40,7 @@ def _within(change: Callable[[HandSample], HandSample], lasting: float) -> Fault
 def _lost(lasting: float, jump: float) -> Fault:
     """Lose the hand; it returns under a new identity, displaced by a ``jump`` [m] that decays in 0.1 s."""
 
-    def fault(samples: Samples, _: float) -> Samples:
+    def fault(samples: Samples) -> Samples:
         hit, found, identity, since = bursts(samples, lasting), [], 100, -np.inf
         for index, (sample, struck) in enumerate(zip(samples, hit)):
             if struck:
@@ -58,11 +58,11 @@ def _lost(lasting: float, jump: float) -> Fault:
     return fault
 
 
-def _repeated(samples: Samples, _: float) -> Samples:
+def _repeated(samples: Samples) -> Samples:
     return [copy for sample in samples for copy in (sample, sample)]
 
 
-def _backward(samples: Samples, _: float) -> Samples:
+def _backward(samples: Samples) -> Samples:
     hit = bursts(samples, 0.3)
     return [
         replace(sample, time=sample.time - 1.0) if struck else sample for sample, struck in zip(samples, hit)
@@ -82,7 +82,7 @@ def _scaled_normal(sample: HandSample, factor: float) -> HandSample:
 _NAN = (np.nan, np.nan, np.nan)
 
 FAULTS: dict[str, Fault] = {
-    "none": lambda samples, _: samples,
+    "none": lambda samples: samples,
     "gesture flicker, 60 ms": _within(lambda s: replace(s, fingers=(False,) * 5), 0.06),
     "unknown gesture, 1 s": _within(lambda s: replace(s, fingers=(False, True, False, True, False)), 1.0),
     "palm flip, 30 ms": _within(lambda s: _scaled_normal(s, -1.0), 0.03),
@@ -110,7 +110,7 @@ def run_with_fault(
     samples: Sequence[HandSample], name: str, settings: SteeringSettings | None = None
 ) -> list[SteeringResult]:
     """Replay samples with a fault of ``FAULTS`` put in."""
-    return replay(GestureSteering(CableDrivenArm(), settings), FAULTS[name](list(samples), 0.0))
+    return replay(GestureSteering(CableDrivenArm(), settings), FAULTS[name](list(samples)))
 
 
 def robustness_table(samples: Sequence[HandSample], settings: SteeringSettings | None = None) -> pd.DataFrame:
