@@ -1,10 +1,11 @@
 """Equations (1)-(8), the state machines of Figs. 4 and 5, their errata and bad input."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from soro_lib.controllers import AssistAsNeeded, FixedAssistance, GoalSelection
@@ -194,6 +195,33 @@ def test_the_two_readings_of_the_counter_differ():
     assert caption[0] > 0  # 1.5 s steady count for the 1 s of moving away
     assert np.all(np.array(text[:100]) == 0)
     assert text[-1] > 0
+
+
+def programmed_stiffness(distances):
+    """The authors' machine from its transition table: a counter, armed (-1) once its limit has passed."""
+    limits = {"steady": 100, "away": 100, "closer": 300}
+    stiffness, counter, previous = [0.0], 0, "start"
+    for last, distance in pairwise(distances):
+        change = distance - last
+        state = "closer" if change < -1e-4 else "away" if change > 1e-4 else "steady"
+        resets = previous == "start" or (previous == "closer") != (state == "closer")
+        if resets:
+            counter = 0
+        if counter >= 0:
+            counter = counter + 1 if counter < limits[state] else -1
+        step = 0.0 if counter >= 0 else -0.2 if state == "closer" else 0.2
+        stiffness.append(min(max(stiffness[-1] + step, 0.0), 50.0))
+        previous = state
+    return stiffness
+
+
+@settings(max_examples=30)
+@given(st.lists(st.tuples(st.integers(1, 350), st.sampled_from([-2e-4, 0.0, 2e-4])), min_size=3, max_size=20))
+def test_the_caption_is_the_authors_program(spells):
+    steps = np.concatenate([np.full(count, step) for count, step in spells])
+    distances = 5.0 + np.cumsum(steps)
+    ours = [result.stiffness for result in drive(AssistAsNeeded(counter="caption"), distances)]
+    np.testing.assert_allclose(ours, programmed_stiffness(distances), atol=1e-9)
 
 
 @pytest.mark.parametrize("counter", ["text", "caption"])
