@@ -328,6 +328,8 @@ class HandoverController:
         """Return the look without what cannot be true, and why the arm should hold ("" if it need not)."""
         rules = self.parameters.safety
         wrist, direction, ball = (finite(v) for v in (look.wrist, look.direction, look.ball))
+        if direction is not None and not abs(np.linalg.norm(direction) - 1) < 0.1:
+            direction = None
         if ball is not None and not look.disagreement <= rules.largest_disagreement:
             ball = None
         if wrist is not None and np.linalg.norm(wrist) > sum(self.arm.maximum_lengths) + rules.reach_margin:

@@ -38,6 +38,11 @@ class HandoverObservation:
         Distance between the two cameras' rays to the ball [m].
     status : str
         "", or what went wrong.
+
+    Raises
+    ------
+    ValueError
+        If wrist, direction or ball does not have three components.
     """
 
     wrist: NDArray[np.float64] | None
@@ -48,6 +53,12 @@ class HandoverObservation:
     ball_deviation: float = 0.002
     disagreement: float = 0.0
     status: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("wrist", "direction", "ball"):
+            vector = getattr(self, name)
+            if vector is not None and np.shape(vector) != (3,):
+                raise ValueError(f"{name} must have shape (3,) or be None, got shape {np.shape(vector)}")
 
 
 class Observer(Protocol):

@@ -88,10 +88,11 @@ def test_carrying_needs_no_ball_in_sight_and_ends_with_an_open_gripper():
         lambda step: {"wrist": None, "direction": None},
         lambda step: {"wrist": np.full(3, np.nan)},
         lambda step: {"direction": np.array([np.inf, 0, 0])},
+        lambda step: {"direction": np.zeros(3)},
         lambda step: {"wrist": np.array([5.0, 0.2 * step, 0.5])},
         lambda step: {"wrist": np.array([5.0, 0.01 * step, 0.5])},
     ],
-    ids=["missing", "NaN", "infinite", "jumping about", "five metres off"],
+    ids=["missing", "NaN", "infinite", "no direction", "jumping about", "five metres off"],
 )
 def test_without_a_pose_the_arm_holds_then_goes_home(blind):
     rules = SafetyRules(hold_limit=4)

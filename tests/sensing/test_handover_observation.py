@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from soro_lib.robots import HelixArm
-from soro_lib.sensing.handover_observation import NO_NOISE, NoisyObserver, VisionNoise, load_vision_noise
+from soro_lib.sensing.handover_observation import (
+    NO_NOISE,
+    HandoverObservation,
+    NoisyObserver,
+    VisionNoise,
+    load_vision_noise,
+)
 
 ARM = HelixArm()
 BALL = np.array([0.15, 0.0, 0.64])
@@ -55,3 +61,8 @@ def test_unknown_estimator_is_named():
 def test_bad_budget_is_named():
     with pytest.raises(ValueError, match="ball_jitter"):
         VisionNoise(0, 0, 0, 0, -1, 0)
+
+
+def test_a_look_of_the_wrong_shape_is_named():
+    with pytest.raises(ValueError, match="ball must have shape"):
+        HandoverObservation(None, None, np.zeros(2))

@@ -17,7 +17,7 @@ from soro_lib.controllers.handover import HandoverCommand, HandoverController, H
 from soro_lib.controllers.virtual_stiffness import within_limits
 from soro_lib.robots.helix_plant import Hand, HelixPlant, TendonMotors
 from soro_lib.sensing.handover_observation import HandoverObservation, Observer
-from soro_lib.studies.soft_handover.handover import Scene, run_handover
+from soro_lib.studies.soft_handover.handover import Guide, Scene, run_handover
 
 ONSET = 2
 """Step at which a fault sets in."""
@@ -99,7 +99,7 @@ class Fault:
     change: Change = lambda look, step, rng: look
     scene: Scene = field(default_factory=Scene)
     motors: TendonMotors = field(default_factory=TendonMotors)
-    guide: Callable[[int, NDArray[np.float64], NDArray[np.float64]], Hand | None] | None = None
+    guide: Guide | None = None
 
 
 def hidden_ring(share: float) -> Change:
@@ -216,7 +216,7 @@ def noise_times(factor: float) -> Change:
     return change
 
 
-def pushed_away(distance: float, gripper_length: float = 0.10) -> Callable[..., Hand | None]:
+def pushed_away(distance: float, gripper_length: float = 0.10) -> Guide:
     """Hold the arm a distance [m] away from the ball for ten steps."""
 
     def guide(step: int, gripper: NDArray[np.float64], ball: NDArray[np.float64]) -> Hand | None:

@@ -3,12 +3,12 @@
 The same claims are tried on both plants; the scorecard takes plant K unless a row names plant E.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.controllers.handover import HandoverParameters
 from soro_lib.controllers.virtual_stiffness import state_limits
@@ -91,14 +91,14 @@ def claims_on_both(tables: HandoverTables) -> pd.DataFrame:
     return shares.rename_axis("claim").reset_index()
 
 
-def as_samples(held: object) -> Samples:
+def as_samples(held: ArrayLike) -> Samples:
     """Return truth values as 1 and 0."""
     return np.asarray(held, dtype=float).ravel()
 
 
-def each(table: pd.DataFrame, keys: list[str], held: object) -> Samples:
+def each(table: pd.DataFrame, keys: list[str], held: Callable[[pd.DataFrame], bool]) -> Samples:
     """Return for every group whether a claim held in it."""
-    return as_samples([held(group) for _, group in table.groupby(keys, sort=False)])  # type: ignore[operator]
+    return as_samples([held(group) for _, group in table.groupby(keys, sort=False)])
 
 
 def falls_fastest_far_away(run: pd.DataFrame) -> bool:
