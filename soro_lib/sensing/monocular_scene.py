@@ -28,6 +28,10 @@ CEILING = -0.150
 STUD = 0.008
 """Depth of the floor, distance of the walls, top of the walls, pitch of the studs on a brick [m]."""
 
+PALM = 0.56
+"""Half length of the palm as a part of the image's height: on the first scene it was raised from 0.42 until the
+moving hand hid all features in rare frames, as Wang et al., Sec. IV-C1, describe."""
+
 PALETTE = (
     (40, 40, 190),
     (170, 90, 30),
@@ -248,7 +252,7 @@ def _hand(
     sideways = np.array([-forward[1], forward[0]])
     mask = np.zeros(size[::-1], dtype=np.float32)
     degrees = float(np.degrees(hand[2]))
-    reach = 0.56 * size[1]
+    reach = PALM * size[1]
     _ellipse(mask, palm, (reach, 0.85 * reach), degrees)
     for place in (-0.62, -0.2, 0.2, 0.62):
         middle = palm + reach * (1.15 * forward + place * sideways)
