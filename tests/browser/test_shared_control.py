@@ -2,7 +2,9 @@
 
 import json
 import math
+import os
 import re
+import signal
 from pathlib import Path
 
 import pytest
@@ -122,13 +124,20 @@ def test_whole_trial_by_pointer_wheel_and_keys(open_notebook, tmp_path):
         assert f"{metrics[name]:.{digits}f}" == number, name
     assert driver.clock() == pytest.approx(metrics["time_s"], abs=0.006)
 
+    plots = page.locator(".jp-CodeCell").nth(1)
+    plots.locator(".cm-content").click()
+    page.keyboard.press("Shift+Enter")
+    plots.get_by_text(driver.file().name).wait_for()
+    plots.locator("img").scroll_into_view_if_needed()
+    page.screenshot(path=tmp_path / "among_the_crowd.png")
+
     table = trial_table(load_trials(driver.file().parent))
     assert list(table["finished"]) == [1.0]
     crowd = table.assign(kind="naive", time_s=1000.0)
     assert (standing(table, crowd, ["time_s"])["below"] == 0.0).all()
 
 
-def test_pause_stop_and_closed_tab_leave_readable_trials(open_notebook, tmp_path):
+def test_pause_stop_closed_tab_and_killed_kernel_leave_readable_trials(open_notebook, tmp_path):
     page = open_notebook("be_the_operator.ipynb")
     driver = Driver(page)
     driver.start("Mostly Autonomous", "real")
@@ -141,11 +150,20 @@ def test_pause_stop_and_closed_tab_leave_readable_trials(open_notebook, tmp_path
     assert driver.clock() == held
     driver.canvas.click(position={"x": 5, "y": 5})
     driver.until(lambda: driver.clock() > held + 0.3, "going on")
+
+    kernel = int(page.locator(".jp-OutputArea-executeResult pre").last.text_content())
+    os.kill(kernel, signal.SIGSTOP)
+    driver.until(lambda: page.locator(ROOT).get_by_text("Waiting for the kernel").is_visible(), "waiting")
+    os.kill(kernel, signal.SIGCONT)
+    held = driver.clock()
+    driver.until(lambda: driver.clock() > held + 0.5, "going on after the kernel was held")
     page.keyboard.press("Escape")
     driver.until(lambda: driver.status() == "stopped", "stop")
     stopped = load_trial(driver.file())
     assert not stopped.complete
-    assert stopped.samples["time_s"].iloc[-1] == pytest.approx(driver.clock(), abs=0.006)
+    times = stopped.samples["time_s"]
+    assert times.iloc[-1] == pytest.approx(driver.clock(), abs=0.006)
+    assert times.diff().iloc[1:].to_numpy() == pytest.approx(0.01), "neither pause nor wait is in the record"
 
     driver.start("Fixed Assistance")
     driver.point((0.2, 0.0))
@@ -154,6 +172,7 @@ def test_pause_stop_and_closed_tab_leave_readable_trials(open_notebook, tmp_path
     page.screenshot(path=tmp_path / "pulled.png")
     file = driver.file()
     page.close()
+    os.kill(kernel, signal.SIGKILL)
     trial = load_trial(file)
     assert not trial.complete
     assert not trial.finished
