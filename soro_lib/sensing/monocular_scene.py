@@ -29,8 +29,8 @@ STUD = 0.008
 """Depth of the floor, distance of the walls, top of the walls, pitch of the studs on a brick [m]."""
 
 PALM = 0.56
-"""Half length of the palm as a part of the image's height: on the first scene it was raised from 0.42 until the
-moving hand hid all features in rare frames, as Wang et al., Sec. IV-C1, describe."""
+"""Half length of the palm as a part of the image's height: on the first scene it was raised from 0.42 until
+the moving hand hid all features in rare frames, as Wang et al., Sec. IV-C1, describe."""
 
 PALETTE = (
     (40, 40, 190),
