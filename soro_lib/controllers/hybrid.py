@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.estimators.gaussian_process import RollingGaussianProcess
-from soro_lib.robots.pneumatic import PneumaticArm
+from soro_lib.robots.base import Robot
 
 Array = NDArray[np.float64]
 
@@ -184,7 +184,7 @@ class HybridResult:
 
     Attributes
     ----------
-    actuation : ndarray (..., 3)
+    actuation : ndarray (..., n)
         Chamber lengths to command [m].
     desired : ndarray (..., 2)
         Desired displacement after the cap [m].
@@ -205,8 +205,9 @@ class HybridController:
 
     Parameters
     ----------
-    robot : PneumaticArm
-        Kinematic model and limits.
+    robot : Robot
+        Kinematic model and limits. The paper's has three chambers; any arm with two actuators or more will
+        do whose actuators are of one kind, since Eq. (24) adds their squares.
     settings : HybridSettings
         Gains, cap and compensator.
     batch : tuple of int
@@ -214,6 +215,7 @@ class HybridController:
 
     Examples
     --------
+    >>> from soro_lib.robots import PneumaticArm
     >>> arm = PneumaticArm()
     >>> controller = HybridController(arm)
     >>> lengths = arm.home
@@ -225,11 +227,13 @@ class HybridController:
     """
 
     def __init__(
-        self, robot: PneumaticArm, settings: HybridSettings | None = None, batch: tuple[int, ...] = ()
+        self, robot: Robot, settings: HybridSettings | None = None, batch: tuple[int, ...] = ()
     ) -> None:
         self.robot = robot
         self.settings = settings or HybridSettings()
-        scales = [self.settings.length_scale_actuation] * 3 + [self.settings.length_scale_motion] * 2
+        scales = [self.settings.length_scale_actuation] * len(robot.lower) + [
+            self.settings.length_scale_motion
+        ] * 2
         self._process = RollingGaussianProcess(
             self.settings.window, scales, outputs=2, noise=self.settings.noise, batch=batch
         )
@@ -249,7 +253,7 @@ class HybridController:
         ----------
         end_effector, goal : array_like (..., 2)
             Measured and wanted tip position, x and y in the base frame [m].
-        lengths : array_like (..., 3)
+        lengths : array_like (..., n)
             Chamber lengths that the steppers stand at [m].
         compensating : bool
             False runs the model-based law alone, while the compensator goes on learning.
