@@ -262,7 +262,7 @@ def test_blend_has_the_paradigms_in_its_corners():
     }
     for (steering, eversion), name in cases.items():
         settings = sweeps.TaskSettings(sweeps.PARADIGMS[name])
-        alone = simulate(sweeps._plans(settings, people, 3, 1, {}))
+        alone = simulate(sweeps.person_plans(settings, people, 3, 1, {}))
         cell = blend[(blend["steering"] == steering) & (blend["eversion"] == eversion)]
         assert cell["time_s"].item() == alone["time_s"].item()
 

@@ -40,7 +40,7 @@ ACTIVE = "operators who steer by sight leave the guidance little to do; seconds 
 REASONS: Mapping[str, str] = {
     "auto_shortest": "its three compulsory lifts cost a skilled operator more than steering by hand does",
     "auto_most_accurate": "under ASME x and y converge while the operator still lowers the tip",
-    "auto_error_not_zero": "the tip creeps in; how near the real one gets depends on gains that are not printed",
+    "auto_error_not_zero": "the tip creeps in; how near the real one gets depends on gains not printed",
     "autonomy_shorter": "",
     "gradual_time": "the lifts of the automatic eversion cost a skilled operator more than they save",
     "gradual_error": "ASME places better than Mostly Autonomous: its slower descent lets x and y converge",

@@ -7,7 +7,7 @@ machines.
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -282,28 +282,18 @@ def _chunks(
         yield piece
 
 
-def _backend(scheduler: Any) -> AbstractContextManager[Any]:
+@contextmanager
+def _backend(scheduler: Any) -> Iterator[None]:
     """Threads in this process, or the workers of a Dask scheduler."""
     if scheduler is None:
-        return joblib.parallel_config(backend="threading")
+        with joblib.parallel_config(backend="threading"):
+            yield
+        return
     from distributed import Client
 
-    return _on_cluster(Client(scheduler) if isinstance(scheduler, str) else nullcontext(scheduler))
-
-
-class _on_cluster:
-    """Run joblib on a Dask client for the duration of a ``with`` block."""
-
-    def __init__(self, client: AbstractContextManager[Any]) -> None:
-        self.client = client
-
-    def __enter__(self) -> None:
-        self.config = joblib.parallel_config(backend="dask", client=self.client.__enter__())
-        self.config.__enter__()
-
-    def __exit__(self, *error: Any) -> None:
-        self.config.__exit__(*error)
-        self.client.__exit__(*error)
+    connection = Client(scheduler) if isinstance(scheduler, str) else nullcontext(scheduler)
+    with connection as client, joblib.parallel_config(backend="dask", client=client):
+        yield
 
 
 def trace_trial(plan: TrialPlan, time_limit: float = TIME_LIMIT) -> pd.DataFrame:

@@ -26,7 +26,7 @@ from soro_lib.studies.shared_control.task import TaskSettings
 KINDS = ("expert", "naive")
 
 
-def _plans(
+def person_plans(
     settings: TaskSettings, people: Sequence[Operator], seed: int, trials: int, labels: dict[str, Any]
 ) -> Iterator[TrialPlan]:
     """Every person for a few trials under one setting; chance is shared between settings."""
@@ -66,7 +66,7 @@ def blend_surface(
                 for eversion in shares:
                     paradigm = Paradigm("Blend", (steering, steering, eversion))
                     labels = {"kind": kind, "steering": steering, "eversion": eversion}
-                    yield from _plans(TaskSettings(paradigm), people, seed, 1, labels)
+                    yield from person_plans(TaskSettings(paradigm), people, seed, 1, labels)
 
     return simulate(plans(), **run)
 
@@ -87,7 +87,7 @@ def misdetection_cost(operators: int, seed: int, offsets: Sequence[float], **run
                 for offset in offsets:
                     settings = TaskSettings(paradigm, detection_error=(offset, 0.0, 0.0))
                     labels = {"kind": kind, "paradigm": name, "offset_mm": 1e3 * offset}
-                    yield from _plans(settings, people, seed, 1, labels)
+                    yield from person_plans(settings, people, seed, 1, labels)
 
     return simulate(plans(), time_limit=120.0, **run)
 
@@ -112,7 +112,7 @@ def tracking_noise_effect(operators: int, seed: int, noises: Sequence[float], **
                     tracking_noise=noise,
                 )
                 labels = {"kind": "naive", "counter": counter, "noise_mm": 1e3 * noise}
-                yield from _plans(settings, people, seed, 1, labels)
+                yield from person_plans(settings, people, seed, 1, labels)
 
     return simulate(plans(), **run)
 
@@ -134,7 +134,7 @@ def dwell_effect(operators: int, seed: int, dwells: Sequence[float], **run: Any)
                 for dwell in dwells:
                     changed = [replace(person, dwell=dwell, **ATTITUDES[attitude]) for person in people]
                     labels = {"paradigm": name, "attitude": attitude, "dwell_s": dwell}
-                    yield from _plans(settings, changed, seed, 2, labels)
+                    yield from person_plans(settings, changed, seed, 2, labels)
 
     return simulate(plans(), **run)
 
@@ -158,7 +158,7 @@ def lift_effect(operators: int, seed: int, **run: Any) -> pd.DataFrame:
         for kind in KINDS:
             people = draw_operators(kind, operators, seed)
             for case, settings in cases.items():
-                yield from _plans(settings, people, seed, 2, {"kind": kind, "case": case})
+                yield from person_plans(settings, people, seed, 2, {"kind": kind, "case": case})
 
     return simulate(plans(), **run)
 
