@@ -29,8 +29,9 @@ def fig03_strain_along_the_helix(fibre: FibreGratings) -> Figure:
         axes[1].plot(position, 100 * strain, marker=".", color=color, label=f"toward {heading:.0f} deg")
     label_axes(axes[0], "place along the fibre [mm]", "axial strain of the skin [%]", title="Same plane")
     label_axes(axes[1], "place along the fibre [mm]", title="Same bend, 45 deg")
+    axes[0].set_ylim(-14.0, 20.0)
     for panel in axes:
-        legend(panel, fontsize=7)
+        legend(panel, loc="upper left", ncols=2, fontsize=7)
     return figure
 
 

@@ -164,18 +164,11 @@ def fig12_fitted_map(run: CurveRun) -> Figure:
 def fig14c_beside_a_rod(run: CurveRun, wall: Wall) -> Figure:
     """Draw the closed curve with a rod beside the arm."""
     figure = _draw_curve(run, (1, 2))
-    path, *rest = figure.axes
-    bend = np.linspace(-1.2, 1.2, 100)
     normal = np.array([np.cos(wall.direction), np.sin(wall.direction)])
-    bending = wall.limit * normal + bend[:, None] * np.array([-normal[1], normal[0]])
-    angle = np.linalg.norm(bending, axis=1)
-    edge = 90.0 * ((1.0 - np.cos(angle)) / angle**2)[:, None] * bending
-    inside = np.linalg.norm(edge, axis=1) < 42.0
-    path.plot(
-        *edge[inside].T, color=COLORS["vermillion"], linewidth=3.0, alpha=0.35, label="reach beside the rod"
-    )
-    for panel in rest:
-        panel.axvline(PERIOD * (run.cycle == 1).sum(), color=COLORS["light"], zorder=0)
+    along = np.array([-normal[1], normal[0]])
+    rod = 38.0 * normal + np.array([[-8.0], [8.0]]) * along
+    figure.axes[0].plot(*rod.T, color=COLORS["vermillion"], linewidth=4.0, alpha=0.5, solid_capstyle="round")
+    figure.axes[0].annotate("rod on this side", 40.0 * normal, ha="left", color=COLORS["vermillion"])
     return figure
 
 
