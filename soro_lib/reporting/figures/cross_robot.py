@@ -63,9 +63,9 @@ def _draw(
         np.maximum(cells[f"{measure}{end}_mm"] * per_mm, SMALLEST) for end in ("", "_low", "_high")
     )
     rows = [names.index(name) for name in cells["controller"]]
-    axes.errorbar(
-        value, rows, xerr=[value - low, high - value], linestyle="none", elinewidth=1.0, label=label, **{"markersize": 4.5, **look},
-    )  # fmt: skip
+    reach = [value - low, high - value]
+    style = {"linestyle": "none", "elinewidth": 1.0, "markersize": 4.5, **look}
+    axes.errorbar(value, rows, xerr=reach, label=label, **style)
 
 
 def paths(runs: Mapping[tuple[str, str], Run]) -> Figure:
