@@ -20,6 +20,10 @@ from soro_lib.robots.cable_driven_kernels import compiled_kinematics
 
 Array = NDArray[np.float64]
 
+LOOP_RATE = 11.0
+"""Printed rate of the loop with servos [Hz]; only its period is derived from it."""
+PAYLOAD, ROBOT_MASS = 4.0, 5.0
+"""Printed masses of bullet case and robot [g]; only their ratio is derived from them."""
 POINTS = ("base", "mid", "tip")
 """Frames {B}, {M}, {T} of the paper."""
 

@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pandas as pd
 
-from soro_lib.calibrations.gesture_steering import POINTS, table2_poses
+from soro_lib.calibrations.gesture_steering import LOOP_RATE, PAYLOAD, POINTS, ROBOT_MASS, table2_poses
 from soro_lib.controllers.gesture_steering import GestureSteering, SteeringSettings
 from soro_lib.controllers.gestures import gesture_count
 from soro_lib.controllers.steering_step import step_bound_as_printed
@@ -44,7 +44,7 @@ def parameter_findings() -> Findings:
         "eq26_cable_minimum": Finding(arm.lower[1]),
         "eq26_bound": Finding(printed_step[1][0]),
         "eq26_scale_slide": Finding(printed_step[0][0, 0]),
-        "fig13_payload_share": Finding(100 * 4.0 / 5.0),
+        "fig13_payload_share": Finding(100 * PAYLOAD / ROBOT_MASS),
     }
 
 
@@ -142,7 +142,7 @@ def loop_findings(rates: pd.DataFrame) -> Findings:
             servo["rate_hz"].mean(),
             "seven sequential writes at one latency timer of 16 ms each; the bus is not described",
         ),
-        "fig9_delay": Finding(1.0 / 11.0, "one period of the printed 11 Hz"),
+        "fig9_delay": Finding(1.0 / LOOP_RATE, "one period of the printed 11 Hz"),
     }
 
 
