@@ -28,8 +28,8 @@ class PrototypeRanges:
     Parameters
     ----------
     bending_rigidity, axial_rigidity : tuple of 2 floats
-        Range of the factor on EI and EA [-]: the widths of Lai et al., Table I, declared as a prior. There they
-        are the change of one segment under load, not an uncertainty; no other width is printed.
+        Range of the factor on EI and EA [-]: the widths of Lai et al., Table I, declared as a prior. There
+        they are the change of one segment under load, not an uncertainty; no other width is printed.
     cable_radius_sd : float
         Position of the printed cable holes [m]; a twentieth of a millimetre for PolyJet parts of this size.
     friction : tuple of 2 floats
