@@ -26,6 +26,7 @@ LOOKS: dict[tuple[str, str], dict[str, Any]] = {
         "marker": "o",
         "markerfacecolor": "none",
         "markersize": 7.5,
+        "elinewidth": 0.0,
         "color": COLORS["black"],
     },
     ("scaled", "disturbed"): {"marker": "o", "color": COLORS["blue"]},

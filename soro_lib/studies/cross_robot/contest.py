@@ -104,7 +104,7 @@ def track(
 
 
 def contest(
-    rng: np.random.Generator, seeds: int = 10, moving: int = 170, holding: int = 40
+    rng: np.random.Generator, seeds: int = 10, moving: int = 180, holding: int = 60
 ) -> tuple[pd.DataFrame, dict[tuple[str, str], Run]]:
     """Let every controller steer every arm, as modelled and disturbed, with constants scaled and as printed.
 

@@ -130,24 +130,26 @@ def guidance(rng: np.random.Generator, runs: int = 10) -> pd.DataFrame:
         One row per arm and distance; forces [N] with the constants as printed and scaled to the arm, and of
         the scaled assist-as-needed when the tip is measured with `SENSOR_NOISE`.
     """
-    rows = []
-    for (name, bench), share in product(benches().items(), DISTANCES):
-        printed, scaled = share * bench.length, share * GROWN_LENGTH
-        noise = SENSOR_NOISE * GROWN_LENGTH
-        rows.append(
-            {
-                "arm": name,
-                "distance_percent": 100.0 * share,
-                "fixed_printed_N": resting_force(FixedAssistance(), printed),
-                "as_needed_printed_N": resting_force(AssistAsNeeded(), printed),
-                "fixed_scaled_N": resting_force(FixedAssistance(), scaled),
-                "as_needed_scaled_N": resting_force(AssistAsNeeded(), scaled),
-                "as_needed_noisy_N": np.mean(
-                    [resting_force(AssistAsNeeded(), scaled, rng, noise) for _ in range(runs)]
-                ),
-            }
-        )
-    return pd.DataFrame(rows)
+    noise = SENSOR_NOISE * GROWN_LENGTH
+    scaled = {}
+    for share in DISTANCES:
+        distance = share * GROWN_LENGTH
+        noisy = [resting_force(AssistAsNeeded(), distance, rng, noise) for _ in range(runs)]
+        scaled[share] = {
+            "fixed_scaled_N": resting_force(FixedAssistance(), distance),
+            "as_needed_scaled_N": resting_force(AssistAsNeeded(), distance),
+            "as_needed_noisy_N": np.mean(noisy),
+        }
+    return pd.DataFrame(
+        {
+            "arm": name,
+            "distance_percent": 100.0 * share,
+            "fixed_printed_N": resting_force(FixedAssistance(), share * bench.length),
+            "as_needed_printed_N": resting_force(AssistAsNeeded(), share * bench.length),
+            **scaled[share],
+        }
+        for (name, bench), share in product(benches().items(), DISTANCES)
+    )
 
 
 def resting_force(
