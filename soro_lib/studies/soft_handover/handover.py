@@ -4,15 +4,23 @@ A run looks, decides and moves, step by step, until the gripper closes or the ar
 by the true ball in the true gripper, never by what the filters believe. Frame `arm_base`, z down.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from soro_lib.controllers.handover import UP, HandoverController, HandoverParameters, Mode
+from soro_lib.controllers.handover import (
+    UP,
+    HandoverCommand,
+    HandoverController,
+    HandoverParameters,
+    Mode,
+)
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
+from soro_lib.robots.helix import HelixArm
 from soro_lib.robots.helix_kernels import tip_points
 from soro_lib.robots.helix_plant import Gripper, Hand, HelixPlant
 from soro_lib.sensing.handover_observation import Observer
@@ -56,6 +64,14 @@ class Scene:
         heading = np.deg2rad(self.headings[location])
         offset = self.lateral * np.array([np.cos(heading), np.sin(heading), 0.0]) + self.height * UP
         return gripper + offset + self.placement_deviation * rng.standard_normal(3)
+
+    def sways(self, rng: np.random.Generator) -> Iterator[NDArray[np.float64]]:
+        """Yield where the hand has swayed to (3,) [m], look by look."""
+        sway = np.zeros(3)
+        fresh = self.sway * np.sqrt(1 - self.sway_memory**2)
+        while True:
+            sway = self.sway_memory * sway + fresh * rng.standard_normal(3)
+            yield sway
 
 
 @dataclass(frozen=True)
@@ -148,67 +164,73 @@ def run_handover(
         A human who pulls the arm.
     step_limit : int
     """
-    scene = scene or Scene()
-    gripper = gripper or Gripper()
     for part in (controller, plant, observer):
         part.reset()
-    arm = controller.arm
-    motors = controller.parameters.motors
-    calibrated = arm.tip_points(arm.home)[3:]
+    arm, motors = controller.arm, controller.parameters.motors
+    sways = (scene or Scene()).sways(rng)
     state = plant.settle(motors.pull(np.zeros(9)))
-    sway = np.zeros(3)
-    rows = []
-    shapes = []
-    overshoot = -np.inf
-    away = (ball - calibrated)[:2] / np.linalg.norm((ball - calibrated)[:2])
+    looks = []
     for step in range(step_limit):
-        sway = scene.sway_memory * sway
-        sway = sway + scene.sway * np.sqrt(1 - scene.sway_memory**2) * rng.standard_normal(3)
-        held_ball = ball + sway
+        held_ball = ball + next(sways)
         command = controller.update(observer.observe(state, held_ball, rng))
-        points = tip_points(state, arm.gripper_length)
-        miss = float(np.linalg.norm(points[3:] - held_ball))
-        overshoot = max(overshoot, float((points[3:5] - held_ball[:2]) @ away))
-        commanded = tip_points(command.q_sys, arm.gripper_length)[3:]
-        q_est = np.full(9, np.nan) if command.q_est is None else command.q_est
-        estimated = np.full(3, np.nan) if command.q_est is None else tip_points(q_est, arm.gripper_length)[3:]
-        shapes.append((state, command.q_sys, q_est))
-        measured = command.measured_points[3:]
-        rows.append(
-            (
-                command.error,
-                np.linalg.norm(measured - calibrated),
-                np.linalg.norm(commanded - calibrated),
-                np.linalg.norm(commanded - measured),
-                np.linalg.norm(estimated - calibrated),
-                np.linalg.norm(estimated - measured),
-                command.estimate_residual,
-                miss,
-                np.linalg.norm(points[3:] - calibrated),
-                command.mode in (Mode.DESCEND, Mode.GRASP),
-            )
-        )
+        looks.append(Look(state, held_ball, command))
         if command.mode in (Mode.GRASP, Mode.STOPPED):
             break
-        hand = guide(step, points[3:], held_ball) if guide else None
+        hand = guide(step, tip_points(state, arm.gripper_length)[3:], held_ball) if guide else None
         state = plant.settle(motors.pull(command.tendon_change), hand)
-    success = command.mode is Mode.GRASP and gripper.holds(points, held_ball)
-    unit = np.array([1.0 if name == "descending" else 1e3 for name in TRACE_COLUMNS])
-    trace = dict(zip(TRACE_COLUMNS, (unit * np.array(rows, dtype=float)).T))
-    states, commands, estimates = np.array(shapes).swapaxes(0, 1)
+    return judged(looks, arm, gripper or Gripper())
+
+
+class Look(NamedTuple):
+    """True state (9,), true ball (3,) [m] and the command that followed from seeing them."""
+
+    state: NDArray[np.float64]
+    ball: NDArray[np.float64]
+    command: HandoverCommand
+
+
+def judged(looks: Sequence[Look], arm: HelixArm, gripper: Gripper) -> HandoverRun:
+    """Return what a run came to, judged by the true ball in the true gripper."""
+    states, balls = (np.array(column) for column in list(zip(*looks))[:2])
+    commands = [look.command for look in looks]
+    unknown = np.full(9, np.nan)
+    q_sys = np.array([command.q_sys for command in commands])
+    q_est = np.array([unknown if command.q_est is None else command.q_est for command in commands])
+    measured = np.array([command.measured_points[3:] for command in commands])
+    calibrated = arm.tip_points(arm.home)[3:]
+    true, commanded = arm.tip_points(states)[:, 3:], arm.tip_points(q_sys)[:, 3:]
+    estimated = np.where(np.isnan(q_est[:, :3]), np.nan, arm.tip_points(np.nan_to_num(q_est))[:, 3:])
+
+    def apart(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 1e3 * np.linalg.norm(first - second, axis=1)
+
+    trace = {
+        "error_mm": 1e3 * np.array([command.error for command in commands]),
+        "measured_mm": apart(measured, calibrated),
+        "commanded_mm": apart(commanded, calibrated),
+        "commanded_gap_mm": apart(commanded, measured),
+        "estimated_mm": apart(estimated, calibrated),
+        "estimated_gap_mm": apart(estimated, measured),
+        "estimate_residual_mm": 1e3 * np.array([command.estimate_residual for command in commands]),
+        "miss_mm": apart(true, balls),
+        "true_mm": apart(true, calibrated),
+        "descending": np.array([c.mode in (Mode.DESCEND, Mode.GRASP) for c in commands], dtype=float),
+    }
+    last = looks[-1]
+    away = (balls[0] - calibrated)[:2] / np.linalg.norm((balls[0] - calibrated)[:2])
     return HandoverRun(
-        step,
-        command.mode,
-        command.reason,
-        success,
-        miss,
-        overshoot,
-        state,
-        held_ball,
-        states,
-        commands,
-        estimates,
-        trace,
+        steps=len(looks) - 1,
+        mode=last.command.mode,
+        reason=last.command.reason,
+        success=last.command.mode is Mode.GRASP and gripper.holds(arm.tip_points(last.state), last.ball),
+        miss=1e-3 * float(trace["miss_mm"][-1]),
+        lateral_overshoot=float(((true - balls)[:, :2] @ away).max()),
+        state=last.state,
+        ball=last.ball,
+        states=states,
+        commands=q_sys,
+        estimates=q_est,
+        trace=trace,
     )
 
 
