@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from soro_lib.calibrations import visual_strain_fusion as calibration
-from soro_lib.controllers.hybrid import HybridSettings
 from soro_lib.robots.pneumatic_plant import ChamberParameters
 from soro_lib.studies.visual_strain_fusion import closed_curve, hybrid_control, tracking
 from soro_lib.studies.visual_strain_fusion.tracking import FittedPlant
@@ -13,13 +12,19 @@ IDEAL = FittedPlant(ChamberParameters(), 0.0)
 FEW = {name: hybrid_control.READINGS[name] for name in ("literal", "no learning")}
 
 
+def run_circle():
+    return hybrid_control.compare_controllers(
+        "circle", np.random.default_rng(1), seeds=2, cycles=1, readings=FEW
+    )
+
+
 @pytest.fixture(scope="module")
 def comparison():
-    return hybrid_control.compare_controllers("circle", np.random.default_rng(1), seeds=2, readings=FEW)
+    return run_circle()
 
 
 def test_same_seed_gives_the_same_tips(comparison):
-    again = hybrid_control.compare_controllers("circle", np.random.default_rng(1), seeds=2, readings=FEW)
+    again = run_circle()
     assert np.array_equal(comparison.compensated["literal"].tip, again.compensated["literal"].tip)
 
 
@@ -57,7 +62,7 @@ def test_cap_of_the_step_is_what_slows_an_ideal_arm():
             "circle",
             np.random.default_rng(1),
             seeds=1,
-            readings={"none": HybridSettings(compensation="none")},
+            readings={},
             plant=IDEAL,
             maximum_step=cap,
         )
