@@ -37,6 +37,7 @@ PRINTED_F: Mapping[str, float] = {
 """Inputs of the arithmetic check of the printed p: nothing that is simulated sees them."""
 
 ACTIVE = "operators who steer by sight leave the guidance little to do; seconds are lost only by passive ones"
+SCATTER = "an F with two error degrees of freedom scatters over decades from one operator to the next"
 REASONS: Mapping[str, str] = {
     "auto_shortest": "its three compulsory lifts cost a skilled operator more than steering by hand does",
     "auto_most_accurate": "under ASME x and y converge while the operator still lowers the tip",
@@ -122,14 +123,14 @@ def factorial_findings(trials: pd.DataFrame) -> dict[str, Finding]:
         if contrast.name == "kmax_assistance":
             reason = "cannot be: H is the mean of a force that is capped at 7 N"
         findings[f"effect_{contrast.name}"] = Finding(effect, reason)
-        findings[f"f_{contrast.name}"] = Finding(blocked_f(samples), ACTIVE, "median")
+        findings[f"f_{contrast.name}"] = Finding(blocked_f(samples), SCATTER, "median")
         sign = (np.sign(effect) == contrast.sign).astype(float)
         against = "a higher k_MAX pulls harder, so a lower one cannot assist more"
         findings[f"sign_{contrast.name}"] = Finding(
             sign, against if contrast.name == "kmax_assistance" else ACTIVE
         )
     interaction = interaction_samples(trials, "assistance_n", "xi_c", "xi_s")
-    findings["f_interaction"] = Finding(blocked_f(interaction), "", "median")
+    findings["f_interaction"] = Finding(blocked_f(interaction), SCATTER, "median")
     findings["sign_interaction"] = Finding(_largest_assistance(trials))
     findings["sign_error_insensitive"] = Finding(
         _error_insensitive(trials), "six tests at 5 % pass together in 74 % of studies by chance alone"
