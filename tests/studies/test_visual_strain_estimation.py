@@ -55,11 +55,8 @@ def test_only_a_finger_on_the_body_presses_on_gratings():
 
 def test_masking_helps_where_the_fibre_stands_alone():
     contacts = {name: collisions.protections()[name] for name in ("bare", "bare, masked")}
-    table = (
-        collisions.sweep_contacts(1, contacts, seeds=1, steps=3200)
-        .groupby(["contact", "estimator"])
-        .max_mm.max()
-    )
+    runs = collisions.sweep_contacts(1, contacts, seeds=2)
+    table = runs.groupby(["contact", "estimator"]).mean_mm.mean()
     assert table["bare, masked", "fibre"] < 0.9 * table["bare", "fibre"]
 
 
