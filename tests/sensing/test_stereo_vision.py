@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from soro_lib.sensing import triangulate
 from soro_lib.sensing.handover_scene import (
     BRIO,
+    SIDE_CAMERA,
     STEREO,
     WEBCAM,
     Extras,

@@ -12,10 +12,21 @@ import pandas as pd
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
 from numpy.typing import NDArray
 
-from soro_lib.reporting.plotting import COLORS, PAGE_WIDTH, label_axes, legend, new_figure
+from soro_lib.reporting.figures.soft_handover import COMMANDED
+from soro_lib.reporting.plotting import (
+    COLORS,
+    ESTIMATE,
+    PAGE_WIDTH,
+    TRUTH,
+    equal_aspect,
+    label_axes,
+    legend,
+    new_figure,
+)
+from soro_lib.robots.helix import origin_from_arm_base
 from soro_lib.sensing.rendered_observation import Look
 from soro_lib.sensing.rendering import Image
 from soro_lib.sensing.stereo_vision import CalibratedCamera, around
@@ -303,4 +314,51 @@ def comparison_with_noise_model(rendered: pd.DataFrame, modelled: Mapping[str, p
     plain_logarithm(axes, "y")
     label_axes(axes, "step size", "steps to the closed gripper")
     legend(axes)
+    return figure
+
+
+SHAPE_STYLES = {"true": TRUTH, "commanded": COMMANDED, "estimated": ESTIMATE}
+"""The arm's shapes."""
+
+
+def explorer_view(
+    pictures: Sequence[Image],
+    shapes: Mapping[str, NDArray[np.float64]],
+    ball: NDArray[np.float64],
+    status: str,
+) -> Figure:
+    """Draw what the explorer shows: both pictures, and the shapes of the arm beside the ball.
+
+    Parameters
+    ----------
+    pictures : sequence of images
+        With what was found in them.
+    shapes : mapping of str to ndarray, shape (n, 3)
+        True, commanded and estimated backbone [m], frame `arm_base`.
+    ball : ndarray, shape (3,)
+        True ball [m].
+    status : str
+        What the arm does.
+    """
+    figure, panels = new_figure(PAGE_WIDTH, 4.2, 2, 2, width_ratios=(1.25, 1))
+    for axes, picture, name in zip(panels[:, 0], pictures, ("left camera", "right camera")):
+        axes.imshow(picture[..., ::-1])
+        axes.set_axis_off()
+        axes.set_title(name)
+    grid = panels[0, 1].get_gridspec()
+    for axes in panels[:, 1]:
+        axes.remove()
+    space = figure.add_subplot(grid[:, 1], projection="3d")
+    drawn = [1e3 * origin_from_arm_base(ball[None])]
+    for name, points in shapes.items():
+        drawn.append(1e3 * origin_from_arm_base(points))
+        style = {key: value for key, value in SHAPE_STYLES[name].items() if key != "zorder"}
+        space.plot(*drawn[-1].T, **style, label=name)
+    space.plot(*drawn[0].T, "o", color=COLORS["green"], markersize=8, label="ball")
+    equal_aspect(space, np.concatenate(drawn))
+    space.xaxis.set_major_locator(MultipleLocator(100))
+    space.yaxis.set_major_locator(MultipleLocator(100))
+    label_axes(space, "x [mm]", "y [mm]", "z [mm]", status)
+    space.zaxis.labelpad = 10
+    legend(figure)
     return figure

@@ -180,25 +180,22 @@ def _estimates(
     cameras: Sequence[CalibratedCamera],
     rng: np.random.Generator,
 ) -> Iterator[tuple[str, Look, WristPose | None, float]]:
-    """Yield for each estimator its name, its look, its wrist and the share of flipped markers.
+    """Yield for each estimator its name, the look, its wrist and the share of flipped markers.
 
-    All are made of the same pictures; gated and joint estimator share their look, which has the same ball.
+    All are made of one look, so the ball is the same: nothing hides it here.
     """
     items = scene.items(state, ball)
     pictures = [photograph(items, view, condition.photometry, rng) for view in condition.views]
-    looks = {
-        name: HandoverVision(cameras, name, track=False, corner_shift=condition.corner_shift).look(pictures)
-        for name in ("thesis", "joint")
-    }
-    vision = HandoverVision(cameras)
+    vision = HandoverVision(cameras, "joint", track=False, corner_shift=condition.corner_shift)
+    look = vision.look(pictures)
+    candidates, flips = true_candidates(look, cameras, scene, state)
+    flipped = float(flips.mean()) if len(flips) else np.nan
     for estimator in ("thesis",) if condition.flips_known else ESTIMATORS:
-        look = looks["thesis" if estimator == "thesis" else "joint"]
-        candidates, flips = true_candidates(look, cameras, scene, state)
         if condition.flips_known and len(candidates):
             wrist: WristPose | None = average_pose(candidates)
         else:
             wrist = vision.estimate(look.markers, estimator)
-        yield estimator, look, wrist, float(flips.mean()) if len(flips) else np.nan
+        yield estimator, look, wrist, flipped
 
 
 def true_candidates(
@@ -266,13 +263,10 @@ class NoiseSources:
     ----------
     poses, looks : int
         Still arms, and looks at each.
-    occluded : int
-        Looks at balls between the fingers.
     """
 
     poses: int = 40
-    looks: int = 12
-    occluded: int = 100
+    looks: int = 8
 
 
 def still_looks(sources: NoiseSources, seed: int, report: Report = nothing) -> pd.DataFrame:
