@@ -11,9 +11,12 @@ const FORCE = 0.02; // m drawn per N
 
 const INK = { force: "#0072B2", goal: "#D55E00", arm: "#009E73", items: ["#0072B2", "#E69F00", "#CC79A7"] };
 const KEYS = {
-  ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [1, -1], ArrowDown: [1, 1],
+  ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown: "down",
   KeyW: [2, -1], KeyS: [2, 1], PageUp: [2, -1], PageDown: [2, 1],
 };
+
+const ABOVE = { left: [0, -1], right: [0, 1], up: [1, -1], down: [1, 1] }; // arrows seen from above
+const AWAY = { left: [1, -1], right: [1, 1], up: [0, 1], down: [0, -1] }; // arrows beside the camera
 
 const STYLE = `
 .soro-operator { outline: none; font: 13px var(--jp-ui-font-family, sans-serif);
@@ -47,30 +50,44 @@ const STYLE = `
 
 // --- Drawing -------------------------------------------------------------------------------------------
 
-// A view of the workspace: `across` and `down` are the axes that run to the right and to the bottom.
-function panel(scene, left, top, scale, across, down, title) {
+// A view of the workspace: `right` and `down` are the directions [3] that run to the right and to the bottom, `from`
+// and `to` the corners seen along them [m].
+function panel(kind, title, left, top, scale, right, down, from, to) {
+  const along = (direction, point) => direction[0] * point[0] + direction[1] * point[1] + direction[2] * point[2];
   return {
-    left, top, scale, title, across, down,
-    width: (scene.high[across] - scene.low[across]) * scale,
-    height: (scene.high[down] - scene.low[down]) * scale,
-    at: (point) => [
-      left + (point[across] - scene.low[across]) * scale,
-      top + (point[down] - scene.low[down]) * scale,
-    ],
+    kind, title, left, top, scale,
+    width: (to[0] - from[0]) * scale,
+    height: (to[1] - from[1]) * scale,
+    at: (point) => [left + (along(right, point) - from[0]) * scale, top + (along(down, point) - from[1]) * scale],
+    // x and y of a pixel, where the view is one from above
+    place: (x, y) => [0, 1].map((axis) =>
+      right[axis] * ((x - left) / scale + from[0]) + down[axis] * ((y - top) / scale + from[1])),
   };
 }
 
-// The view from above and the view from the front, side by side, x to the right in both.
+const [MARGIN, HEAD] = [14, 30];
+
+// Two views side by side: from above and from the front; or, as the study's operators work, a camera that looks along x
+// and downwards, and beside it nothing but the hand.
 function layout(scene, width) {
-  const [margin, head] = [14, 30];
-  const scale = Math.min((width - 3 * margin) / 2 / (scene.high[0] - scene.low[0]), 640);
-  const panelWidth = (scene.high[0] - scene.low[0]) * scale;
-  const left = (width - 2 * panelWidth - margin) / 2;
-  return {
-    height: head + (scene.high[2] - scene.low[2]) * scale + margin,
-    above: panel(scene, left, head, scale, 0, 1, "from above: pointer = x, y"),
-    front: panel(scene, left + panelWidth + margin, head, scale, 0, 2, "from the front: wheel = height"),
-  };
+  const [low, high, tilt] = [scene.low, scene.high, scene.elevation];
+  const [x, y, z] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+  const size = tilt ? [high[1] - low[1], high[0] - low[0]] : [high[0] - low[0], high[2] - low[2]];
+  const scale = Math.min((width - 3 * MARGIN) / 2 / size[0], tilt ? 600 : 640);
+  const left = (width - 2 * size[0] * scale - MARGIN) / 2;
+  const next = left + size[0] * scale + MARGIN;
+  const common = { height: HEAD + size[1] * scale + MARGIN };
+  if (!tilt) {
+    const above = panel("above", "from above: pointer = x, y", left, HEAD, scale, x, y, [low[0], low[1]], [high[0], high[1]]);
+    const front = panel("front", "from the front: wheel = height", next, HEAD, scale, x, z, [low[0], low[2]], [high[0], high[2]]);
+    return { ...common, pad: above, all: [above, front] };
+  }
+  const back = [-1, 0, 0];
+  const sight = [-Math.sin(tilt), 0, Math.cos(tilt)];
+  const top = -0.06;
+  const pad = panel("pad", "your hand: pointer = x (away), y", left, HEAD, scale, y, back, [low[1], -high[0]], [high[1], -low[0]]);
+  const camera = panel("camera", "camera", next, HEAD, scale, y, sight, [low[1], top], [high[1], top + size[1]]);
+  return { ...common, pad, all: [pad, camera] };
 }
 
 function stroke(context, points, color, width, dash = []) {
@@ -97,17 +114,25 @@ function disc(context, [x, y], radius, fill, edge, width = 1.5) {
   }
 }
 
-function drawRoom(context, view, scene, ink) {
+// Lines every 0.1 m along two axes, at the height of the table.
+function drawGrid(context, view, scene, ink, axes) {
   context.globalAlpha = 0.13;
-  for (const axis of [view.across, view.down]) {
+  for (const axis of axes) {
     for (let value = Math.ceil(scene.low[axis] * 10) / 10; value <= scene.high[axis]; value += 0.1) {
       const ends = [[...scene.low], [...scene.high]];
-      ends.forEach((end) => (end[axis] = value));
+      ends.forEach((end) => {
+        if (!axes.includes(2)) end[2] = scene.table;
+        end[axis] = value;
+      });
       stroke(context, ends.map(view.at), ink, 1);
     }
   }
   context.globalAlpha = 1;
-  if (view.down !== 2) return;
+}
+
+function drawRoom(context, view, scene, ink) {
+  drawGrid(context, view, scene, ink, view.kind === "front" ? [0, 2] : [0, 1]);
+  if (view.kind !== "front") return;
   const [left, surface] = view.at([scene.low[0], 0, scene.table]);
   context.fillStyle = ink;
   context.globalAlpha = 0.15;
@@ -140,18 +165,18 @@ function drawBody(context, view, tip, alpha) {
   stroke(context, [from, to], shade, 2 * radius);
   context.lineCap = "butt";
   context.globalAlpha = 1;
-  if (view.down === 2) {
+  if (view.kind !== "above") {
     context.fillStyle = "#8a8a8a";
-    context.fillRect(from[0] - 0.09 * view.scale, view.top, 0.18 * view.scale, 0.022 * view.scale);
+    context.fillRect(from[0] - 0.09 * view.scale, from[1], 0.18 * view.scale, 0.022 * view.scale);
   } else disc(context, from, 0.05 * view.scale, null, "#8a8a8a", 2);
 }
 
 function drawTargets(context, view, scene) {
-  scene.targets.forEach((target, i) => {
-    const [x, y] = view.at(target);
-    const [wide, high] = [0.05 * view.scale, (view.down === 2 ? 0.006 : 0.05) * view.scale];
+  const flatness = { above: 1, front: 0.12, camera: Math.sin(scene.elevation) }[view.kind];
+  scene.targets.forEach(([tx, ty], i) => {
+    const [x, y] = view.at([tx, ty, scene.table]);
     context.beginPath();
-    context.ellipse(x, y + (view.down === 2 ? 0.025 * view.scale : 0), wide, high, 0, 0, 2 * Math.PI);
+    context.ellipse(x, y, 0.05 * view.scale, 0.05 * view.scale * flatness, 0, 0, 2 * Math.PI);
     context.fillStyle = context.strokeStyle = INK.items[i % 3];
     context.globalAlpha = 0.14;
     context.fill();
@@ -161,19 +186,25 @@ function drawTargets(context, view, scene) {
   });
 }
 
-function drawItems(context, view, frame) {
-  frame.items.forEach((item, i) => {
+function drawItems(context, view, scene, frame) {
+  const side = 0.05 * view.scale;
+  const farFirst = frame.items.map((item, i) => [item, i]).sort(([a], [b]) => b[0] - a[0]);
+  for (const [item, i] of farFirst) {
     const [x, y] = view.at(item);
-    const side = 0.05 * view.scale;
+    const lid = view.kind === "camera" ? side * Math.sin(scene.elevation) : 0;
+    const face = view.kind === "camera" ? side * Math.cos(scene.elevation) : side;
     context.fillStyle = INK.items[i % 3];
-    context.fillRect(x - side / 2, y - side / 2, side, side);
+    context.fillRect(x - side / 2, y - (face + lid) / 2, side, face + lid);
+    context.fillStyle = "#ffffff66";
+    context.fillRect(x - side / 2, y - (face + lid) / 2, side, lid);
     context.fillStyle = "white";
     context.font = "600 13px sans-serif";
     context.textAlign = "center";
-    context.fillText(i + 1, x, y + 5);
+    context.fillText(i + 1, x, y + lid / 2 + 5);
     context.textAlign = "left";
-    if (frame.status === "running" && frame.reachable === i) disc(context, [x, y], 0.048 * view.scale, null, INK.items[i % 3], 3);
-  });
+    const seen = frame.status === "running" && view.kind !== "camera";
+    if (seen && frame.reachable === i) disc(context, [x, y], 0.048 * view.scale, null, INK.items[i % 3], 3);
+  }
 }
 
 function drawGoal(context, view, frame) {
@@ -188,14 +219,26 @@ function drawTip(context, view, frame, { closed, ink, paper }) {
   disc(context, view.at(frame.tip), 0.016 * view.scale, closed ? ink : paper, ink, 2.5);
 }
 
+function drawForce(context, view, frame, place) {
+  if (!frame.force || Math.hypot(...frame.force) < 0.02) return;
+  const [from, end] = [place, place.map((value, axis) => value + FORCE * frame.force[axis])].map(view.at);
+  const angle = Math.atan2(end[1] - from[1], end[0] - from[0]);
+  const head = [2.6, -2.6].map((turn) => [end[0] + 10 * Math.cos(angle + turn), end[1] + 10 * Math.sin(angle + turn)]);
+  stroke(context, [from, end], INK.force, 4);
+  stroke(context, [head[0], end, head[1]], INK.force, 4);
+  context.fillStyle = INK.force;
+  context.font = "600 12px sans-serif";
+  const label = [end[0] + 22 * Math.cos(angle) - 14, end[1] + 22 * Math.sin(angle) + 4];
+  context.fillText(`${Math.hypot(...frame.force).toFixed(1)} N`, ...label);
+}
+
 // The pointer, the hand that the force has pulled away from it, and the force itself.
-function drawHand(context, view, scene, frame, aim, ink) {
-  const free = [view.across, view.down].some((axis) => scene.automation[axis] < 1);
-  if (!free) return;
+function drawHand(context, view, { scene, frame, aim, ink }) {
+  if (scene.automation.every((share) => share === 1)) return;
   const hand = aim.map((value, axis) => value + (frame.give ? frame.give[axis] : 0));
-  const seen = (point) => view.at(point.map((value, axis) =>
-    scene.automation[axis] < 1 ? value : frame.desired ? frame.desired[axis] : frame.tip[axis]));
-  const [from, to] = [seen(aim), seen(hand)];
+  const free = (point) => point.map((value, axis) =>
+    scene.automation[axis] < 1 ? value : (frame.desired || frame.tip)[axis]);
+  const [from, to] = [aim, hand].map((point) => view.at(free(point)));
   if (Math.hypot(to[0] - from[0], to[1] - from[1]) > 3) {
     context.globalAlpha = 0.6;
     stroke(context, [from, to], ink, 1.2, [3, 3]);
@@ -205,20 +248,11 @@ function drawHand(context, view, scene, frame, aim, ink) {
   disc(context, to, 9, null, ink, 1.6);
   stroke(context, [[to[0] - 14, to[1]], [to[0] + 14, to[1]]], ink, 1.2);
   stroke(context, [[to[0], to[1] - 14], [to[0], to[1] + 14]], ink, 1.2);
-  if (!frame.force || Math.hypot(...frame.force) < 0.02) return;
-  const end = [to[0] + frame.force[view.across] * FORCE * view.scale, to[1] + frame.force[view.down] * FORCE * view.scale];
-  const angle = Math.atan2(end[1] - to[1], end[0] - to[0]);
-  stroke(context, [to, end], INK.force, 4);
-  const head = [2.6, -2.6].map((turn) => [end[0] + 10 * Math.cos(angle + turn), end[1] + 10 * Math.sin(angle + turn)]);
-  stroke(context, [head[0], end, head[1]], INK.force, 4);
-  context.fillStyle = INK.force;
-  context.font = "600 12px sans-serif";
-  const label = [end[0] + 22 * Math.cos(angle) - 14, end[1] + 22 * Math.sin(angle) + 4];
-  context.fillText(`${Math.hypot(...frame.force).toFixed(1)} N`, ...label);
+  drawForce(context, view, frame, free(hand));
 }
 
 function drawView(context, view, state) {
-  const { scene, frame, aim, trail, ink, armed } = state;
+  const { scene, frame, trail, ink, armed } = state;
   context.fillStyle = ink;
   context.font = "600 12px sans-serif";
   context.fillText(view.title, view.left, view.top - 11);
@@ -227,17 +261,21 @@ function drawView(context, view, state) {
   context.rect(view.left, view.top, view.width, view.height);
   context.clip();
   drawRoom(context, view, scene, ink);
-  if (view.down === 2) drawBody(context, view, frame.tip, 0.9);
-  drawTargets(context, view, scene);
-  drawItems(context, view, frame);
-  if (view.down === 1) drawBody(context, view, frame.tip, 0.38);
-  context.globalAlpha = 0.4;
-  stroke(context, trail.map(view.at), ink, 1.4);
-  context.globalAlpha = 1;
-  drawGoal(context, view, frame);
-  drawTip(context, view, frame, state);
-  if (armed && view.down === 1) disc(context, view.at(scene.start), RING * view.scale, null, INK.goal, 3);
-  drawHand(context, view, scene, frame, aim, ink);
+  if (view.kind !== "pad") {
+    if (view.kind !== "above") drawBody(context, view, frame.tip, view.kind === "camera" ? 0.75 : 0.9);
+    drawTargets(context, view, scene);
+    drawItems(context, view, scene, frame);
+    if (view.kind === "above") drawBody(context, view, frame.tip, 0.38);
+    context.globalAlpha = 0.4;
+    stroke(context, trail.map(view.at), ink, 1.4);
+    context.globalAlpha = 1;
+    drawGoal(context, view, frame);
+    drawTip(context, view, frame, state);
+  }
+  const pad = view.kind === "above" || view.kind === "pad";
+  if (armed && pad) disc(context, view.at(scene.start), RING * view.scale, null, INK.goal, 3);
+  if (view.kind === "camera") drawForce(context, view, frame, frame.tip);
+  else drawHand(context, view, state);
   context.restore();
 }
 
@@ -287,12 +325,12 @@ function hint(frame, scene, { closed, confirmed }) {
   if (frame.phase.startsWith("lifting")) return "The machine lifts.";
   if (held) return closed ? `Bring ${item} to its disc and open the gripper: <kbd>space</kbd>` : "Letting go ...";
   if (closed) return "The gripper has caught nothing; open it: <kbd>space</kbd>";
-  return frame.reachable >= 0 ? "Close the gripper: <kbd>space</kbd>" : `Bring the tip to ${item}.`;
+  return frame.reachable >= 0 && !scene.elevation ? "Close the gripper: <kbd>space</kbd>" : `Bring the tip to ${item}.`;
 }
 
 // The line above the drawing: what to do, or why the clock stands.
 function wordText(frame, scene, hand, { armed, paused, waiting, elsewhere }) {
-  if (armed) return "Bring the pointer to the tip, into the ring seen from above, or press <kbd>enter</kbd>: the clock starts.";
+  if (armed) return "Bring the pointer into the ring on the left, or press <kbd>enter</kbd>: the clock starts.";
   if (paused) return "Paused. Click into the drawing to go on.";
   if (waiting) return "Waiting for the kernel; the clock is held.";
   if (frame.status === "running" && !elsewhere) return hint(frame, scene, hand);
@@ -391,7 +429,7 @@ function render({ model, el }) {
     canvas.style.height = `${views.height}px`;
     canvas.width = width * ratio;
     canvas.height = views.height * ratio;
-    canvas.dataset.above = JSON.stringify([views.above.left, views.above.top, views.above.scale]);
+    canvas.dataset.pad = JSON.stringify([[0, 0, 0], [1, 0, 0], [0, 1, 0]].map(views.pad.at));
     const context = canvas.getContext("2d");
     context.scale(ratio, ratio);
     const { color: ink, backgroundColor: paper } = getComputedStyle(root);
@@ -400,8 +438,7 @@ function render({ model, el }) {
       scene: fixed, frame: now, trail, ink, paper, armed: why.armed,
       aim: own ? hand.aim : now.tip, closed: own && hand.closed,
     };
-    drawView(context, views.above, state);
-    drawView(context, views.front, state);
+    for (const view of views.all) drawView(context, view, state);
   }
 
   // What the operator does is noted at every frame of the screen while the clock runs, and sent in batches.
@@ -423,7 +460,7 @@ function render({ model, el }) {
     last = now;
     if (driving()) {
       for (const code of held) {
-        const [axis, sign] = KEYS[code];
+        const [axis, sign] = scene().elevation ? AWAY[KEYS[code]] || KEYS[code] : ABOVE[KEYS[code]] || KEYS[code];
         const speed = axis === 2 ? SPEED.vertical : SPEED.lateral;
         hand.aim[axis] = clamp(hand.aim[axis] + sign * speed * elapsed, axis);
       }
@@ -438,10 +475,9 @@ function render({ model, el }) {
   canvas.addEventListener("pointermove", (event) => {
     if (!live() || !views) return;
     const box = canvas.getBoundingClientRect();
-    const { left, top, scale, width } = views.above;
-    const [x, y] = [event.clientX - box.left - left, event.clientY - box.top - top];
-    if (x > width + 7) return; // over the other view
-    const place = [scene().low[0] + x / scale, scene().low[1] + y / scale];
+    const [x, y] = [event.clientX - box.left, event.clientY - box.top];
+    if (x > views.pad.left + views.pad.width + MARGIN / 2) return; // over the other view
+    const place = views.pad.place(x, y);
     const away = Math.hypot(place[0] - scene().start[0], place[1] - scene().start[1]);
     if (!hand.begun && away < RING) hand.begun = true;
     if (driving()) place.forEach((value, axis) => (hand.aim[axis] = clamp(value, axis)));

@@ -31,7 +31,7 @@ from soro_lib.reporting.figures.shared_control import fig02_task
 from soro_lib.robots.soft_growing_plant import NOTHING, SAMPLE_TIME, nearest_item
 from soro_lib.studies.shared_control.recorder import TrialRecorder, next_number, recordable, sample_line
 from soro_lib.studies.shared_control.simulation import METRICS, TIME_LIMIT, trial_metrics
-from soro_lib.studies.shared_control.trials import TrialHeader, load_trials
+from soro_lib.studies.shared_control.trials import VIEWS, TrialHeader, load_trials
 from soro_lib.widgets.frontend import is_live
 
 LOW, HIGH = (-0.26, -0.33, 0.0), (0.56, 0.33, 0.72)
@@ -257,7 +257,8 @@ class OperatorExplorer(ipywidgets.VBox):
 
     Attributes
     ----------
-    paradigm, environment, law : ipywidgets.Dropdown
+    paradigm, environment, law, sight : ipywidgets.Dropdown
+        ``sight``: from above and front, or through a camera as the simulated operators see.
     stiffness : ipywidgets.SelectionSlider
         Of the hand [N/m].
     view : OperatorView
@@ -279,7 +280,8 @@ class OperatorExplorer(ipywidgets.VBox):
             description="hand [N/m]", options=HAND_STIFFNESSES, value=EXPERT.hand_stiffness,
             layout={"width": "280px"}, style={"description_width": "80px"},
         )  # fmt: skip
-        self.controls = (self.paradigm, self.environment, self.law, self.stiffness)
+        self.sight = _choice("view", VIEWS, "230px")
+        self.controls = (self.paradigm, self.environment, self.law, self.sight, self.stiffness)
         self.view = OperatorView(layout={"width": "100%"})
         self.view.on_msg(lambda _, content, __: self.receive(content))
         for control in self.controls:
@@ -321,6 +323,7 @@ class OperatorExplorer(ipywidgets.VBox):
             force_law=self.law.value,
             seed=(self.seed, next_number(self.folder)),
             hand_stiffness=float(self.stiffness.value),
+            view=self.sight.value,
         )
         self.trial = DrivenTrial(self.folder, header)
         self._show()
@@ -359,6 +362,7 @@ class OperatorExplorer(ipywidgets.VBox):
             "guided": rule.assistance != 0,
             "confirms": rule.confirmed_by_hand,
             "phases": [name for name in PHASES[1:-1] if rule.goals.lift or "lift" not in name],
+            "elevation": EXPERT.view_elevation if self.sight.value == "camera" else 0.0,
             "lifted": rule.goals.lifted_height if rule.goals.lift else None,
             "folder": str(self.folder),
         }

@@ -45,10 +45,11 @@ class Driver:
         return Path(self.page.locator(ROOT).get_attribute("data-file"))
 
     def point(self, place):
-        """Move the pointer to where a place is seen from above."""
-        left, top, scale = json.loads(self.canvas.get_attribute("data-above"))
+        """Move the pointer to where the hand commands a place."""
+        (x0, y0), (x1, y1), (x2, y2) = json.loads(self.canvas.get_attribute("data-pad"))
         box = self.canvas.bounding_box()
-        x, y = left + (place[0] + 0.26) * scale, top + (place[1] + 0.33) * scale
+        x = x0 + place[0] * (x1 - x0) + place[1] * (x2 - x0)
+        y = y0 + place[0] * (y1 - y0) + place[1] * (y2 - y0)
         self.page.mouse.move(box["x"] + x, box["y"] + y, steps=8)
 
     def until(self, condition, what, timeout=20.0):
@@ -62,10 +63,11 @@ class Driver:
         gap = math.dist([self.tip()[axis] for axis in axes], [place[axis] for axis in axes])
         return gap < distance
 
-    def start(self, paradigm, arm="simulated"):
+    def start(self, paradigm, arm="simulated", view="above and front"):
         choices = self.page.locator(".widget-dropdown select")
         choices.nth(0).select_option(label=paradigm)
         choices.nth(1).select_option(label=arm)
+        choices.nth(3).select_option(label=view)
         self.page.locator(f"{ROOT} button").click()
         self.until(lambda: self.status() == "armed", "arming")
         self.point(SCENE.start)
@@ -165,7 +167,7 @@ def test_pause_stop_closed_tab_and_killed_kernel_leave_readable_trials(open_note
     assert times.iloc[-1] == pytest.approx(driver.clock(), abs=0.006)
     assert times.diff().iloc[1:].to_numpy() == pytest.approx(0.01), "neither pause nor wait is in the record"
 
-    driver.start("Fixed Assistance")
+    driver.start("Fixed Assistance", view="camera")
     driver.point((0.2, 0.0))
     driver.until(lambda: driver.tip()[0] > 0.05, "motion")
     driver.until(lambda: driver.clock() > 1.5, "full force")

@@ -55,15 +55,20 @@ HEADER = {
     "force_law": "[-] printed or program: which reading of the guidance force",
     "operator": "[-] who was at the controls",
     "kind": "[-] group of operators that the trial is shown with, such as expert, naive or own",
+    "view": "[-] above and front, or camera: what the operator saw of the task",
     "seed": "[-] entropy of the arm's chance; empty for a trial that no simulator can replay",
     "hand_stiffness_n_per_m": "[N/m] of the hand through which the force acts",
     "start_m": "[m] tip at the start, base frame, z down",
     "items_m": "[m] centres of the items, in the order of the task",
     "targets_m": "[m] centres of their targets",
 }
-"""Entries of the header and their units; force_law, kind, seed and hand_stiffness_n_per_m may be left out."""
+"""Entries of the header and their units; force_law, kind, view, seed and hand_stiffness_n_per_m may be left
+out."""
 
 AXES = ("x", "y", "z")
+
+VIEWS = ("above and front", "camera")
+"""What an operator may see of the task: two views that leave no doubt about depth, or one that does."""
 
 
 def _axes(name: str, unit: str, meaning: str) -> dict[str, str]:
@@ -121,6 +126,7 @@ class TrialHeader:
     operator: str
     force_law: str = "printed"
     kind: str = "own"
+    view: str = "camera"
     seed: tuple[int, ...] = ()
     hand_stiffness: float = EXPERT.hand_stiffness
     scene: Scene = field(default_factory=Scene)
@@ -128,6 +134,8 @@ class TrialHeader:
     def __post_init__(self) -> None:
         if self.paradigm not in PARADIGMS:
             raise ValueError(f"paradigm must be one of {', '.join(PARADIGMS)}, got {self.paradigm!r}")
+        if self.view not in VIEWS:
+            raise ValueError(f"view must be one of {', '.join(VIEWS)}, got {self.view!r}")
         positive("hand_stiffness_n_per_m", self.hand_stiffness)
         for name in ("operator", "kind"):
             if not getattr(self, name):
@@ -155,6 +163,7 @@ class TrialHeader:
             "force_law": self.force_law,
             "operator": self.operator,
             "kind": self.kind,
+            "view": self.view,
             "seed": self.seed,
             "hand_stiffness_n_per_m": self.hand_stiffness,
             "start_m": self.scene.start,
@@ -201,15 +210,16 @@ class TrialHeader:
             operator=values["operator"],
             force_law=values.get("force_law", "printed"),
             kind=values.get("kind", "own"),
+            view=values.get("view", "camera"),
             seed=tuple(values.get("seed", ())),
             hand_stiffness=float(values.get("hand_stiffness_n_per_m", EXPERT.hand_stiffness)),
             scene=scene,
         )
 
 
-OPTIONAL_ENTRIES = ("force_law", "kind", "seed", "hand_stiffness_n_per_m")
+OPTIONAL_ENTRIES = ("force_law", "kind", "view", "seed", "hand_stiffness_n_per_m")
 ENTRY_TYPES: Mapping[str, Any] = {
-    **dict.fromkeys(("paradigm", "environment", "force_law", "operator", "kind"), str),
+    **dict.fromkeys(("paradigm", "environment", "force_law", "operator", "kind", "view"), str),
     **dict.fromkeys(("seed", "start_m", "items_m", "targets_m"), list),
     "hand_stiffness_n_per_m": (int, float),
 }

@@ -278,6 +278,10 @@ BAD_FILES = {
         lambda lines: set_header(lines, "environment", '"imagined"'),
         "environment must be",
     ),
+    "view": (
+        lambda lines: set_header(lines, "view", '"mirror"'),
+        "view must be one of above and front, camera",
+    ),
     "law": (lambda lines: set_header(lines, "force_law", '"third"'), "force_law must be"),
     "no paradigm": (
         lambda lines: [line for line in lines if not line.startswith("# paradigm")],
