@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from soro_lib.controllers.shared_control import PARADIGMS
+from soro_lib.operators import EXPERT
 from soro_lib.operators.people import DEVICE_SCALE
 from soro_lib.project import data_directory
 from soro_lib.studies.shared_control.trials import TrialHeader, load_trial, load_trials, trial_table
@@ -189,8 +190,10 @@ def test_nothing_is_written_before_the_start(explorer):
 def test_choices_are_recorded_and_fixed_during_a_trial(explorer):
     explorer.paradigm.value, explorer.environment.value = "fixed_assistance", "real"
     explorer.law.value, explorer.stiffness.value = "program", 300.0
+    explorer.sight.value = "camera"
     assert explorer.view.scene["title"] == "Fixed Assistance"
     assert explorer.view.scene["confirms"]
+    assert explorer.view.scene["elevation"] == EXPERT.view_elevation
     explorer.receive({"type": "start"})
     assert explorer.view.frame["status"] == "armed"
     assert all(control.disabled for control in explorer.controls)
@@ -201,7 +204,7 @@ def test_choices_are_recorded_and_fixed_during_a_trial(explorer):
     assert not any(control.disabled for control in explorer.controls)
     recorded = load_trials(explorer.folder)[0].header
     assert (recorded.paradigm, recorded.environment) == ("fixed_assistance", "real")
-    assert (recorded.force_law, recorded.hand_stiffness) == ("program", 300.0)
+    assert (recorded.force_law, recorded.hand_stiffness, recorded.view) == ("program", 300.0, "camera")
 
 
 def test_law_can_be_chosen_only_where_there_is_a_force(explorer):
