@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from soro_lib.reporting.plotting import COLORS, PAGE_WIDTH, REFERENCE, label_axes, legend, new_figure
-from soro_lib.reporting.published import load_published
+from soro_lib.reporting.scorecard import build_scorecard
 from soro_lib.robots.pneumatic_plant import Wall
 from soro_lib.studies.visual_strain_fusion.closed_curve import CurveRun, octopus
 from soro_lib.studies.visual_strain_fusion.hybrid_control import Comparison
@@ -135,9 +135,9 @@ def tables12_learning_or_gain(summary: pd.DataFrame) -> Figure:
 def cap_or_no_cap(summaries: Mapping[str, pd.DataFrame]) -> Figure:
     """Draw the model-based error over the gain under several hypotheses about the 3 mm, and as published."""
     figure, axes = new_figure(PAGE_WIDTH, 3.2, columns=2)
-    published = load_published("visual_strain_fusion")
+    published = build_scorecard("visual_strain_fusion", {}).set_index("id")["published"]
     for panel, table in zip(axes, ("table1", "table2")):
-        cells = [published[f"{table}_kp{100 * gain:02.0f}_model_error_mean"].value for gain in GAINS]
+        cells = [published[f"{table}_kp{100 * gain:02.0f}_model_error_mean"] for gain in GAINS]
         panel.plot(GAINS, cells, "x", color=COLORS["black"], markersize=8, zorder=5, label="published")
     for name, summary in summaries.items():
         model = summary[summary.controller == "model"]
@@ -168,7 +168,9 @@ def fig14c_beside_a_rod(run: CurveRun, wall: Wall) -> Figure:
     along = np.array([-normal[1], normal[0]])
     rod = 38.0 * normal + np.array([[-8.0], [8.0]]) * along
     figure.axes[0].plot(*rod.T, color=COLORS["vermillion"], linewidth=4.0, alpha=0.5, solid_capstyle="round")
-    figure.axes[0].annotate("rod on this side", 40.0 * normal, ha="left", color=COLORS["vermillion"])
+    figure.axes[0].annotate(
+        "rod on this side", (40.0 * normal[0], 40.0 * normal[1]), ha="left", color=COLORS["vermillion"]
+    )
     return figure
 
 
