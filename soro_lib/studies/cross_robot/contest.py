@@ -111,7 +111,7 @@ def contest(
     Parameters
     ----------
     rng : numpy.random.Generator
-        Draws mounts, sensor noise and hands, the same for every controller.
+        Draws mounts, sensor noise and hands, the same for every controller and arm.
     seeds : int
         Arms per condition.
     moving, holding : int
@@ -129,9 +129,9 @@ def contest(
     """
     rows: list[dict[str, Any]] = []
     runs: dict[tuple[str, str], Run] = {}
-    for (arm, bench), chance in zip(benches().items(), rng.spawn(4), strict=True):
-        plants = disturbed_and_not(bench.robot, seeds, chance)
-        noise = int(chance.integers(2**32))
+    mounts, noise = rng.integers(2**32, size=2)
+    for arm, bench in benches().items():
+        plants = disturbed_and_not(bench.robot, seeds, np.random.default_rng(mounts))
         for (name, controller), scaled in product(controllers().items(), (True, False)):
             if not scaled and not (name in PRINTED and controller.differs_in_size(bench)):
                 continue
