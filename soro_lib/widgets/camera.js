@@ -18,7 +18,6 @@ function render({ model, el }) {
     const previous = address;
     address = URL.createObjectURL(new Blob([picture], { type: "image/jpeg" }));
     image.src = address;
-    image.alt = model.get("label");
     if (previous) setTimeout(() => URL.revokeObjectURL(previous), 500);
   }
 
@@ -64,8 +63,11 @@ function render({ model, el }) {
     last = [last[0] + step[0], last[1] + step[1]];
     send(1);
   });
+  const name = () => image.setAttribute("alt", model.get("label"));
   model.on("change:picture", show);
+  model.on("change:label", name);
   show();
+  name();
 }
 
 export default { render };

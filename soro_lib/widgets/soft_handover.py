@@ -175,9 +175,9 @@ class CameraPicture(anywidget.AnyWidget):
 
 
 SHAPE_LOOKS = {
-    "true": (0.026, COLORS["grey"]),
-    "commanded": (0.007, COLORS["purple"]),
-    "estimated": (0.007, COLORS["blue"]),
+    "true": (0.012, COLORS["grey"]),
+    "commanded": (0.006, COLORS["purple"]),
+    "estimated": (0.006, COLORS["blue"]),
 }
 """Radius [m] and colour of the arm's shapes in the drawing."""
 
@@ -313,7 +313,7 @@ class HandoverExplorer(ipywidgets.VBox):
             HIGH,
             hangs=True,
             grid=0.1,
-            caption="grey: true arm, purple: commanded, blue: estimated",
+            caption="grey: true arm, purple: commanded, blue: estimated; drag to turn",
         )
         self.message.value = session.status()
 
