@@ -85,7 +85,7 @@ def paths(runs: Mapping[tuple[str, str], Run]) -> Figure:
                 )
             panel.plot(*(1e3 * (run.goals[:, :2] - centre)).T, **REFERENCE)
             half = 1e3 * np.ptp(run.goals[:, 0]) / 2.0
-            panel.set(aspect="equal", xlim=(-1.5 * half, 1.5 * half), ylim=(-1.2 * half, 1.2 * half))
+            panel.set(aspect="equal", xlim=(-1.5 * half, 1.5 * half), ylim=(-1.35 * half, 1.35 * half))
             panel.tick_params(labelsize=6.5)
     for panel, arm in zip(axes[0], arms, strict=True):
         panel.set_title(arm, loc="center", fontsize=9)
