@@ -115,11 +115,11 @@ def chain_transform(configuration: ArrayLike) -> FloatArray:
     if arcs.ndim == 2:
         rows = _IDENTITY_ROWS
         for arc in _scalar_arcs(arcs):
-            rows = tuple(_carry(row, arc) for row in rows)
+            rows = tuple(carry(row, arc) for row in rows)
         return np.array((*rows, _LAST_ROW))
     frame: tuple[Any, ...] = _identity_frame(arcs)
     for arcs_of_segment in _batch_arcs(arcs):
-        frame = _carry(frame, arcs_of_segment)
+        frame = carry(frame, arcs_of_segment)
     return _pack_transform(frame, arcs.shape[:-2])
 
 
@@ -204,7 +204,7 @@ def backbone(configuration: ArrayLike, points_per_segment: int = 20) -> FloatArr
     fractions = np.arange(1, points_per_segment + 1) / points_per_segment
     for arc in np.moveaxis(_flat_batch(arcs), 1, 0):
         pieces = _batch_arc(*(arc.T[:, :, np.newaxis] * fractions))
-        stretched = _carry(tuple(column[..., np.newaxis] for column in frame), pieces)
+        stretched = carry(tuple(column[..., np.newaxis] for column in frame), pieces)
         points.append(stretched[3])
         frame = tuple(column[..., -1] for column in stretched)
     return np.moveaxis(np.concatenate(points, axis=-1), 0, -1).reshape(*arcs.shape[:-2], -1, 3)
@@ -258,7 +258,7 @@ def _as_configuration(configuration: ArrayLike) -> FloatArray:
     return arcs
 
 
-def _carry(row: Sequence[Any], arc: Sequence[Any]) -> tuple[Any, ...]:
+def carry(row: Sequence[Any], arc: Sequence[Any]) -> tuple[Any, ...]:
     """Multiply a row (or the rows) of a 3 x 4 frame by the transform of an arc from the right."""
     x_axis, y_axis, z_axis, origin = row
     dx, dy, length, sinc, versinc, cosine = arc
@@ -267,7 +267,7 @@ def _carry(row: Sequence[Any], arc: Sequence[Any]) -> tuple[Any, ...]:
     return x_axis - dx * chord, y_axis - dy * chord, sinc * bend + cosine * z_axis, origin + length * chord
 
 
-def _velocities(row: Sequence[Any], arc: Sequence[Any], slopes: Sequence[Any]) -> tuple[Any, ...]:
+def end_velocities(row: Sequence[Any], arc: Sequence[Any], slopes: Sequence[Any]) -> tuple[Any, ...]:
     """Return a row of an arc's end velocities: three linear (dx, dy, length), then two angular (dx, dy).
 
     The angular ones are the columns of the left Jacobian of SO(3), whose second coefficient
@@ -293,15 +293,17 @@ def _cross(a: Any, b: Any) -> tuple[Any, Any, Any]:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-# One chain: plain floats, which at this size are ten times faster than arrays.
+# One chain: plain floats, which at this size are ten times faster than arrays. The functions of one row and
+# one arc are also compiled, as they stand, by `soro_lib.arc_kernels` (njit).
 
 
 def _scalar_arcs(arcs: FloatArray) -> list[tuple[float, ...]]:
     """Return (dx, dy, length, sinc, versinc, cosine) of every arc of one chain, as floats."""
-    return [_scalar_arc(dx, dy, length) for dx, dy, length in arcs.tolist()]
+    return [arc_numbers(dx, dy, length) for dx, dy, length in arcs.tolist()]
 
 
-def _scalar_arc(dx: float, dy: float, length: float) -> tuple[float, ...]:
+def arc_numbers(dx: float, dy: float, length: float) -> tuple[float, ...]:
+    """Return (dx, dy, length, S, C, cos D) of one arc, as floats."""
     half = 0.5 * math.hypot(dx, dy)
     half_sine = math.sin(half)
     half_sinc = half_sine / half if half > 0.0 else 1.0
@@ -315,21 +317,26 @@ def _scalar_arc(dx: float, dy: float, length: float) -> tuple[float, ...]:
     )
 
 
-def _scalar_slopes(arc: Sequence[float]) -> tuple[float, float]:
+def arc_slopes(arc: Sequence[float]) -> tuple[float, float]:
+    """Return S' and C', the derivatives of S and C by D, each over D."""
     dx, dy, _, sinc, versinc, cosine = arc
     square = dx * dx + dy * dy
-    if square < _SERIES_BOUND:
-        return _horner(_DS_SERIES, square), _horner(_DC_SERIES, square)
-    return (cosine - sinc) / square, (sinc - 2.0 * versinc) / square
+    if square >= _SERIES_BOUND:
+        return (cosine - sinc) / square, (sinc - 2.0 * versinc) / square
+    sinc_slope = versinc_slope = 0.0
+    for sinc_term, versinc_term in zip(_DS_SERIES, _DC_SERIES):
+        sinc_slope = sinc_slope * square + sinc_term
+        versinc_slope = versinc_slope * square + versinc_term
+    return sinc_slope, versinc_slope
 
 
 def _scalar_transform_and_jacobian(arcs: FloatArray) -> tuple[FloatArray, FloatArray]:
     rows = _IDENTITY_ROWS
     ends = []
     for arc in _scalar_arcs(arcs):
-        slopes = _scalar_slopes(arc)
-        columns = list(zip(*[_velocities(row, arc, slopes) for row in rows]))
-        rows = tuple(_carry(row, arc) for row in rows)
+        slopes = arc_slopes(arc)
+        columns = list(zip(*[end_velocities(row, arc, slopes) for row in rows]))
+        rows = tuple(carry(row, arc) for row in rows)
         ends.append((columns, (rows[0][3], rows[1][3], rows[2][3])))
     tip = ends[-1][1] if ends else (0.0, 0.0, 0.0)
     jacobian: list[tuple[float, ...]] = []
@@ -402,8 +409,8 @@ def _batch_transform_and_jacobian(arcs: FloatArray) -> tuple[FloatArray, FloatAr
     frame = _identity_frame(arcs)
     ends = []
     for arc in _batch_arcs(arcs):
-        velocities = _velocities(frame, arc, _batch_slopes(arc))
-        frame = _carry(frame, arc)
+        velocities = end_velocities(frame, arc, _batch_slopes(arc))
+        frame = carry(frame, arc)
         ends.append((velocities, frame[3]))
     jacobian = np.zeros((frame[0].shape[1], 6, 3 * count))
     for index, ((along_x, along_y, along, turn_x, turn_y), end) in enumerate(ends):

@@ -1,5 +1,6 @@
 """Where things lie: the only module that knows the folders of the project."""
 
+import hashlib
 import os
 from pathlib import Path
 
@@ -39,3 +40,14 @@ def figures_directory(slug: str) -> Path:
     """
     current_run = Path(os.environ.get("SORO_FIGURES", ROOT / "figures")) / slug
     return current_run if current_run.is_dir() else ROOT / "figures" / slug
+
+
+def compiled_code_directory() -> Path:
+    """Return where numba keeps compiled code: one folder per state of all the sources it compiles.
+
+    Numba itself watches only the file that a function stands in, not the files of the functions it calls, so
+    an edited equation could go on running in its old form.
+    """
+    sources = (path.read_bytes() for path in sorted((ROOT / "soro_lib").rglob("*.py")))
+    digest = hashlib.sha256(b"".join(source for source in sources if b"jit" in source)).hexdigest()
+    return ROOT / "build" / "compiled" / digest[:16]

@@ -20,6 +20,7 @@ from soro_lib.workbook.notebooks import conforms, find_notebooks
 FLOORS = {
     "soro_lib.project": 0,
     "soro_lib.arcs": 0,
+    "soro_lib.arc_kernels": 0,
     "soro_lib.poses": 0,
     "soro_lib.paths": 0,
     "soro_lib.datacards": 0,
@@ -55,7 +56,7 @@ def upward_imports(source: str, path: Path) -> list[str]:
     package = ".".join(path.parts[:-1])
     own = room(".".join(path.with_suffix("").parts))
     if own == "soro_lib.__init__":
-        return sorted(imported_names(source, package))
+        return sorted(name for name in imported_names(source, package) if FLOORS.get(room(name), 0) > 0)
     return sorted(
         name
         for name in imported_names(source, package)

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from soro_lib.arc_kernels import chain_frame_and_jacobian, swing
 from soro_lib.robots.base import Robot
 from soro_lib.robots.cable_driven import CABLE_ANGLES, CableDrivenArm
 
@@ -82,121 +83,64 @@ _COS, _SIN = np.cos(CABLE_ANGLES), np.sin(CABLE_ANGLES)
 
 
 @njit(cache=True)
-def _arc(vx, vy):  # type: ignore[no-untyped-def]
-    """Return S, A, c = cos(theta) and the slopes S1 = S'/theta, A1 = A'/theta of one arc."""
-    t = vx * vx + vy * vy
-    if t < 1e-2:
-        sinc = 1 - t / 6 * (1 - t / 20 * (1 - t / 42 * (1 - t / 72)))
-        versine = 0.5 - t / 24 * (1 - t / 30 * (1 - t / 56 * (1 - t / 90)))
-        sinc_slope = -1 / 3 + t / 30 * (1 - t / 28 * (1 - t / 54))
-        versine_slope = -1 / 12 + t / 180 * (1 - t * 3 / 112 * (1 - t * 2 / 135))
-        return sinc, versine, 1 - t * versine, sinc_slope, versine_slope
-    theta = np.sqrt(t)
-    sinc, cosine = np.sin(theta) / theta, np.cos(theta)
-    versine = (1 - cosine) / t
-    return sinc, versine, cosine, (cosine - sinc) / t, (sinc - 2 * versine) / t
+def _kinematics(q: Array, parameters: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """Return tip, mid and direction (3,) and their Jacobians (3, 7)."""
+    _, _, _, _, _, cap = parameters
+    soft, soft_slope = _soft_segments(q, parameters)
+    pieces = np.zeros((5, 3))
+    pieces[0, 2], pieces[2, 2], pieces[4, 2] = q[0], cap, cap
+    pieces[1], pieces[3] = soft[0], soft[1]
+    mid_frame, mid_velocities = chain_frame_and_jacobian(pieces[:3])
+    tip_frame, tip_velocities = chain_frame_and_jacobian(pieces)
+    direction = np.ascontiguousarray(tip_frame[:, 2])
+    turning = tip_velocities.copy()
+    turning[:3] = 0.0
+    swing(turning, direction)
+    tip_jacobian, mid_jacobian = np.zeros((3, 7)), np.zeros((3, 7))
+    direction_jacobian = np.zeros((3, 7))
+    tip_jacobian[2, 0] = mid_jacobian[2, 0] = 1.0
+    for row in range(3):
+        for column in range(1, 7):
+            for u in range(3):
+                proximal, distal = soft_slope[u, column], soft_slope[3 + u, column]
+                tip_jacobian[row, column] += (
+                    tip_velocities[row, 3 + u] * proximal + tip_velocities[row, 9 + u] * distal
+                )
+                mid_jacobian[row, column] += mid_velocities[row, 3 + u] * proximal
+                direction_jacobian[row, column] += (
+                    turning[row, 3 + u] * proximal + turning[row, 9 + u] * distal
+                )
+    tip, mid = tip_frame[:, 3].copy(), mid_frame[:, 3].copy()
+    return tip, mid, direction, tip_jacobian, mid_jacobian, direction_jacobian
 
 
 @njit(cache=True)
-def _end(vx, vy, arc, out, slope):  # type: ignore[no-untyped-def]
-    """Fill the end direction (3,) of an arc, the unit-length end point (3,) and their slopes by vx, vy."""
-    sinc, versine, cosine, sinc_slope, versine_slope = arc
-    v = (vx, vy)
-    for i in range(2):
-        out[0, i], out[1, i] = versine * v[i], sinc * v[i]
-        for j in range(2):
-            delta = 1.0 if i == j else 0.0
-            slope[0, j, i] = versine * delta + versine_slope * v[j] * v[i]
-            slope[1, j, i] = sinc * delta + sinc_slope * v[j] * v[i]
-        slope[0, i, 2], slope[1, i, 2] = sinc_slope * v[i], -sinc * v[i]
-    out[0, 2], out[1, 2] = sinc, cosine
+def _soft_segments(q: Array, parameters: Array) -> tuple[Array, Array]:
+    """Return the soft segments (2, 3) as (dx, dy, length) and their slope (6, 7) by the actuation.
 
-
-@njit(cache=True)
-def _turn(vx, vy, arc, p, out):  # type: ignore[no-untyped-def]
-    """Apply the rotation of an arc, Lai et al., Eq. (24), to the vector p."""
-    sinc, versine, cosine, _, _ = arc
-    along = vx * p[0] + vy * p[1]
-    out[0] = p[0] - versine * vx * along + sinc * vx * p[2]
-    out[1] = p[1] - versine * vy * along + sinc * vy * p[2]
-    out[2] = -sinc * along + cosine * p[2]
-
-
-@njit(cache=True)
-def _turn_slope(vx, vy, arc, j, p, out):  # type: ignore[no-untyped-def]
-    """Apply the derivative of the rotation by vx (j = 0) or vy (j = 1) to the vector p."""
-    sinc, versine, _, sinc_slope, versine_slope = arc
-    vj, pj = (vx, p[0]) if j == 0 else (vy, p[1])
-    along = vx * p[0] + vy * p[1]
-    radial = -versine_slope * vj * along - versine * pj + sinc_slope * vj * p[2]
-    out[0], out[1] = vx * radial, vy * radial
-    out[j] += sinc * p[2] - versine * along
-    out[2] = -sinc_slope * vj * along - sinc * pj - sinc * vj * p[2]
-
-
-@njit(cache=True)
-def _kinematics(q, parameters):  # type: ignore[no-untyped-def]
-    length, radius, stiffness, rigidity, coupling, cap = parameters
-    force, moment = np.zeros(2), np.zeros((2, 2))
-    for k in range(2):
-        for i in range(3):
-            tension = -q[1 + 3 * k + i]
-            force[k] += tension
-            moment[k, 0] += radius * tension * _COS[i]
-            moment[k, 1] += radius * tension * _SIN[i]
-    s1, s2 = length - (force[0] + force[1]) / stiffness, length - force[1] / stiffness
-    m1x, m1y = moment[0, 0] + coupling * moment[1, 0], moment[0, 1] + coupling * moment[1, 1]
-    v1x, v1y = m1x * s1 / rigidity, m1y * s1 / rigidity
-    v2x, v2y = moment[1, 0] * s2 / rigidity, moment[1, 1] * s2 / rigidity
-
-    arc1, arc2 = _arc(v1x, v1y), _arc(v2x, v2y)
-    end1, end2, slope1, slope2 = np.empty((2, 3)), np.empty((2, 3)), np.empty((2, 2, 3)), np.empty((2, 2, 3))
-    _end(v1x, v1y, arc1, end1, slope1)
-    _end(v2x, v2y, arc2, end2, slope2)
-    reach2 = s2 * end2[0] + cap * end2[1]
-    mid, tip, direction, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for a in range(3):
-        mid[a] = s1 * end1[0, a] + cap * end1[1, a]
-    mid[2] += q[0]
-    _turn(v1x, v1y, arc1, reach2, w)
-    for a in range(3):
-        tip[a] = mid[a] + w[a]
-    _turn(v1x, v1y, arc1, end2[1], direction)
-
-    # derivatives by (v1x, v1y, s1, v2x, v2y, s2)
-    d_mid, d_tip, d_direction = np.zeros((6, 3)), np.zeros((6, 3)), np.zeros((6, 3))
-    for j in range(2):
-        for a in range(3):
-            d_mid[j, a] = s1 * slope1[0, j, a] + cap * slope1[1, j, a]
-        _turn_slope(v1x, v1y, arc1, j, reach2, w)
-        for a in range(3):
-            d_tip[j, a] = d_mid[j, a] + w[a]
-        _turn_slope(v1x, v1y, arc1, j, end2[1], d_direction[j])
-        _turn(v1x, v1y, arc1, s2 * slope2[0, j] + cap * slope2[1, j], d_tip[3 + j])
-        _turn(v1x, v1y, arc1, slope2[1, j], d_direction[3 + j])
-    for a in range(3):
-        d_mid[2, a] = d_tip[2, a] = end1[0, a]
-    _turn(v1x, v1y, arc1, end2[0], d_tip[5])
-
-    # actuation to arcs: tension = -command
-    gain = np.zeros((6, 7))
+    Lai et al., Eqs. (1)-(3) as one vector equation, as in `CableDrivenArm.segments`.
+    """
+    length, radius, stiffness, rigidity, coupling, _ = parameters
+    force, force_slope = np.zeros(2), np.zeros((2, 7))
+    moment, moment_slope = np.zeros((2, 2)), np.zeros((2, 2, 7))
     for k in range(2):
         for i in range(3):
             column = 1 + 3 * k + i
-            sign = 1.0 if k == 0 else coupling
-            gain[0, column] = -sign * radius * _COS[i] * s1 / rigidity + m1x / (stiffness * rigidity)
-            gain[1, column] = -sign * radius * _SIN[i] * s1 / rigidity + m1y / (stiffness * rigidity)
-            gain[2, column] = 1.0 / stiffness
-            if k == 1:
-                gain[3, column] = -radius * _COS[i] * s2 / rigidity + moment[1, 0] / (stiffness * rigidity)
-                gain[4, column] = -radius * _SIN[i] * s2 / rigidity + moment[1, 1] / (stiffness * rigidity)
-                gain[5, column] = 1.0 / stiffness
-    tip_jacobian, mid_jacobian, direction_jacobian = np.zeros((3, 7)), np.zeros((3, 7)), np.zeros((3, 7))
-    for a in range(3):
-        for column in range(1, 7):
-            for u in range(6):
-                tip_jacobian[a, column] += d_tip[u, a] * gain[u, column]
-                mid_jacobian[a, column] += d_mid[u, a] * gain[u, column]
-                direction_jacobian[a, column] += d_direction[u, a] * gain[u, column]
-    tip_jacobian[2, 0] = mid_jacobian[2, 0] = 1.0
-    return tip, mid, direction, tip_jacobian, mid_jacobian, direction_jacobian
+            for segment in range(k + 1):
+                share = coupling if segment < k else 1.0
+                force_slope[segment, column] = -1.0
+                moment_slope[segment, 0, column] = -share * radius * _COS[i]
+                moment_slope[segment, 1, column] = -share * radius * _SIN[i]
+                force[segment] += force_slope[segment, column] * q[column]
+                for axis in range(2):
+                    moment[segment, axis] += moment_slope[segment, axis, column] * q[column]
+    soft, slope = np.empty((2, 3)), np.empty((6, 7))
+    for k in range(2):
+        soft[k, 2] = length - force[k] / stiffness
+        slope[3 * k + 2] = -force_slope[k] / stiffness
+        for axis in range(2):
+            soft[k, axis] = moment[k, axis] * soft[k, 2] / rigidity
+            slope[3 * k + axis] = (
+                moment_slope[k, axis] * soft[k, 2] + moment[k, axis] * slope[3 * k + 2]
+            ) / rigidity
+    return soft, slope
