@@ -5,12 +5,10 @@ random stream of its own, so that the numbers depend neither on the other trials
 machines.
 """
 
-import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import joblib
@@ -20,14 +18,12 @@ import pandas as pd
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from soro_lib.controllers.shared_control import goal_selection
 from soro_lib.controllers.shared_control.checks import Vector
 from soro_lib.controllers.shared_control.goal_selection import LIFTING_EMPTY
 from soro_lib.controllers.shared_control.guidance import distance_to_goal
-from soro_lib.operators import EXPERT, Operator, loop
+from soro_lib.operators import EXPERT, Operator
 from soro_lib.operators.hand import hand_command
 from soro_lib.operators.loop import OperatorState, View, operator_start, operator_step, picture_buffer
-from soro_lib.robots import soft_growing_plant
 from soro_lib.robots.soft_growing_plant import NOTHING, SAMPLE_TIME
 from soro_lib.studies.shared_control.task import (
     TaskMemory,
@@ -146,26 +142,7 @@ def play(
     return state
 
 
-def _compile(digest: str) -> Callable[..., TaskState]:
-    """Compile `play`, kept on disk under a digest of all rules: numba itself watches a single file."""
-
-    @numba.njit(cache=True, nogil=True)
-    def compiled(task, state, memory, operator, human, pictures, rng, samples, trace):  # type: ignore[no-untyped-def]
-        digest  # noqa: B018 (part of the key in numba's cache)
-        return play(task, state, memory, operator, human, pictures, rng, samples, trace)
-
-    return compiled
-
-
-def _digest() -> str:
-    """Digest of every source file whose rules are compiled into `play`."""
-    folders = [Path(module.__file__ or "").parent for module in (goal_selection, loop)]
-    files = [path for folder in folders for path in sorted(folder.glob("*.py"))]
-    files += [Path(soft_growing_plant.__file__), Path(__file__).with_name("task.py"), Path(__file__)]
-    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
-
-
-_compiled_play = _compile(_digest())
+_compiled_play = numba.njit(cache=True, nogil=True)(play)
 
 
 def play_trial(
