@@ -29,6 +29,10 @@ WHY_CIRCLE = (
     "the printed column is worse at 0.06 than at 0.04, against the trend of both controllers; no mechanism "
     "of the plant gives that"
 )
+WHY_PERCENT = (
+    "here the mean of deviation over the distance of the path point from the start; at the inner corners of "
+    "the star that distance is small and weighs much, and the paper does not say which point it takes"
+)
 WHY_SPREAD = (
     "most of the spread is the approach after the switch, which depends on where the model had stopped"
 )
@@ -78,7 +82,8 @@ def table_findings(summary: pd.DataFrame) -> dict[str, Finding]:
                 spread = WHY_SPREAD if name == "hybrid" else WHY_MODEL_SPREAD
                 findings[f"{cell}_{name}_{measure}_mean"] = Finding(rows[f"{measure}_mm"], why)
                 findings[f"{cell}_{name}_{measure}_sd"] = Finding(rows[f"{measure}_sd_mm"], spread)
-                findings[f"{cell}_{name}_{measure}_percent"] = Finding(rows[f"{measure}_percent"], why)
+                share = WHY_PERCENT if (path, measure) == ("pentagram", "deviation") else why
+                findings[f"{cell}_{name}_{measure}_percent"] = Finding(rows[f"{measure}_percent"], share)
         rows = better[(better.path == path) & (better.gain == gain) & (better.controller == "literal")]
         for measure in ("error", "deviation"):
             findings[f"{cell}_{measure}_improvement"] = Finding(
