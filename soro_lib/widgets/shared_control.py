@@ -31,7 +31,8 @@ from soro_lib.reporting.figures.shared_control import fig02_task
 from soro_lib.robots.soft_growing_plant import NOTHING, SAMPLE_TIME, nearest_item
 from soro_lib.studies.shared_control.recorder import TrialRecorder, next_number, recordable, sample_line
 from soro_lib.studies.shared_control.simulation import METRICS, TIME_LIMIT, trial_metrics
-from soro_lib.studies.shared_control.trials import VIEWS, TrialHeader, load_trials
+from soro_lib.studies.shared_control.trial_format import VIEWS, TrialHeader
+from soro_lib.studies.shared_control.trials import load_trials
 from soro_lib.widgets.frontend import is_live
 
 LOW, HIGH = (-0.26, -0.33, 0.0), (0.56, 0.33, 0.72)

@@ -12,7 +12,8 @@ from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.operators import EXPERT
 from soro_lib.operators.people import DEVICE_SCALE
 from soro_lib.project import data_directory
-from soro_lib.studies.shared_control.trials import TrialHeader, load_trial, load_trials, trial_table
+from soro_lib.studies.shared_control.trial_format import TrialHeader
+from soro_lib.studies.shared_control.trials import load_trial, load_trials, trial_table
 from soro_lib.widgets import frontend
 from soro_lib.widgets.shared_control import (
     HIGH,

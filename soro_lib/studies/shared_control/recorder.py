@@ -18,7 +18,7 @@ from soro_lib.robots.soft_growing_plant import NOTHING, SAMPLE_TIME
 from soro_lib.studies.shared_control.demonstrations import KINDS, draw_operators
 from soro_lib.studies.shared_control.simulation import TIME_LIMIT, next_place
 from soro_lib.studies.shared_control.task import Sample, Trial
-from soro_lib.studies.shared_control.trials import TrialHeader, trial_columns
+from soro_lib.studies.shared_control.trial_format import TrialHeader, trial_columns
 
 RESOLUTION = 6
 """Decimals of a command [m]: what is written is what the arm was given, so that a trial can be replayed."""

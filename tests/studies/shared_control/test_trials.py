@@ -30,15 +30,8 @@ from soro_lib.studies.shared_control.recorder import (
 )
 from soro_lib.studies.shared_control.simulation import METRICS, TRACE, TrialPlan, simulate, trial_metrics
 from soro_lib.studies.shared_control.task import TaskSettings
-from soro_lib.studies.shared_control.trials import (
-    TrialError,
-    TrialHeader,
-    load_trial,
-    load_trials,
-    standing,
-    trial_columns,
-    trial_table,
-)
+from soro_lib.studies.shared_control.trial_format import TrialError, TrialHeader, trial_columns
+from soro_lib.studies.shared_control.trials import load_trial, load_trials, standing, trial_table
 
 SHIPPED_FOLDER = data_directory("shared_control") / "trials"
 
@@ -156,7 +149,7 @@ def test_trial_survives_a_killed_process(tmp_path):
     code = (
         "import os, signal; from pathlib import Path\n"
         "from soro_lib.studies.shared_control.recorder import TrialRecorder, sample_line\n"
-        "from soro_lib.studies.shared_control.trials import TrialHeader\n"
+        "from soro_lib.studies.shared_control.trial_format import TrialHeader\n"
         "header = TrialHeader('asme', 'simulated', 'reader', seed=(1,)); task = header.task()\n"
         f"recorder = TrialRecorder(Path({str(tmp_path)!r}), header)\n"
         "for _ in range(30):\n"
