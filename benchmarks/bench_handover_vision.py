@@ -19,7 +19,7 @@ def rows() -> list[Row]:
     scene = HandoverScene()
     state = scene.arm.home.copy()
     state[[3, 4, 6, 7]] = -0.5, 0.2, 0.25, -0.1
-    ball = scene.arm.tip_points(state)[3:] + [-0.06, 0.02, 0.05]
+    ball = scene.arm.tip_points(state)[3:] + np.array([-0.06, 0.02, 0.05])
     cameras = [CalibratedCamera(view.camera, view.pose) for view in STEREO]
     rng = np.random.default_rng(1)
     pictures = [[photograph(scene.items(state, ball), v, WEBCAM, rng) for v in STEREO] for _ in range(2)]

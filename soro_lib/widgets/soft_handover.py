@@ -38,7 +38,7 @@ from soro_lib.widgets.view import ArmView, arm_scene, tube
 PACE = 0.25
 """Time between steps while the arm runs [s]; the thesis needs 1.4 s on its own computer."""
 
-BALL = HelixArm().tip_points(HelixArm().home)[3:] + np.array([-0.13, 0.06, 0.0]) + 0.06 * UP
+BALL = HelixArm().tip_points(HelixArm().home)[3:] + np.array([-0.14, -0.03, 0.0]) + 0.06 * UP
 """Where the ball is at first [m]."""
 
 LOW, HIGH = np.array([-0.35, -0.35, 0.0]), np.array([0.35, 0.35, 0.9])
@@ -63,6 +63,8 @@ class HandoverSession:
         Cameras with a hand on the lens.
     command : HandoverCommand or None
         What followed from the last look.
+    estimate : ndarray, shape (9,), or None
+        The last ``q_est``.
     state : ndarray, shape (9,)
         True state of the arm.
     """
@@ -82,6 +84,7 @@ class HandoverSession:
         self.observer = RenderedObserver(HandoverVision(self.cameras, estimator), spoil=self._cover)
         self.push: NDArray[np.float64] | None = None
         self.command: HandoverCommand | None = None
+        self.estimate: NDArray[np.float64] | None = None
         self.steps = 0
         self.state = self.plant.settle(self.controller.parameters.motors.pull(np.zeros(9)))
         self.look()
@@ -98,6 +101,7 @@ class HandoverSession:
     def step(self) -> bool:
         """Decide from the last look, move, and look again; return whether the run goes on."""
         self.command = self.controller.update(self.seen)
+        self.estimate = self.estimate if self.command.q_est is None else self.command.q_est
         if self.finished:
             return False
         hand = None
@@ -144,8 +148,8 @@ class HandoverSession:
     def shapes(self) -> dict[str, NDArray[np.float64]]:
         """Return the true, commanded and estimated backbones with the gripper (n, 3) [m]."""
         states = {"true": self.state, "commanded": self.controller.q_sys}
-        if self.command is not None and self.command.q_est is not None:
-            states["estimated"] = self.command.q_est
+        if self.estimate is not None:
+            states["estimated"] = self.estimate
         arm = self.controller.arm
         return {
             name: np.concatenate([backbone(q.reshape(3, 3), 12), arm.tip_points(q)[None, 3:]])
