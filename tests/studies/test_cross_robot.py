@@ -178,17 +178,17 @@ def test_interval_is_students() -> None:
 
 def test_fist_locks_the_middle_of_redundant_arms_only() -> None:
     table = redundancy().set_index("arm")
-    redundant = table["free_at_tip"] >= 3
+    redundant = table["free_tip"] >= 3
     assert list(table.index[redundant]) == ["cable-driven", "helix"]
-    assert (table.loc[redundant, "mid_fist_percent"] < 1.0).all()
-    assert (table.loc[redundant, "mid_palm_percent"] > 10.0).all()
-    assert table.loc["pneumatic", "tip_undone_fist_percent"] > 20.0
-    assert (table["stretch_virtual"] <= table["stretch_unit"] + 1e-9).all()
+    assert (table.loc[redundant, "fist_percent"] < 1.0).all()
+    assert (table.loc[redundant, "palm_percent"] > 10.0).all()
+    assert table.loc["pneumatic", "undone_percent"] > 20.0
+    assert (table["stiff_stretch"] <= table["unit_stretch"] + 1e-9).all()
 
 
 def test_guidance_is_out_of_range_on_short_arms_and_with_noise() -> None:
-    table = guidance(np.random.default_rng(0), runs=2).set_index(["arm", "distance_percent"])
-    assert table.loc[("pneumatic", 20.0), "as_needed_printed_N"] == 0.0
-    assert table.loc[("pneumatic", 20.0), "as_needed_scaled_N"] > 1.0
+    table = guidance(np.random.default_rng(0), runs=2).set_index(["arm", "away_percent"])
+    assert table.loc[("pneumatic", 20.0), "needed_printed_N"] == 0.0
+    assert table.loc[("pneumatic", 20.0), "needed_scaled_N"] > 1.0
     assert_allclose(table.loc[("pneumatic", 10.0), "fixed_printed_N"], 10.0 * 0.009, rtol=1e-9)
-    assert (table["as_needed_noisy_N"] < 0.1 * table["as_needed_scaled_N"].clip(lower=1e-3)).all()
+    assert (table["needed_noisy_N"] < 0.1 * table["needed_scaled_N"].clip(lower=1e-3)).all()

@@ -40,10 +40,11 @@ def redundancy() -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row per arm: ``actuators``; how many are ``free_at_tip`` and ``free_at_tip_and_direction``; the
-        motion of the mid point in percent of the tip motion asked for, with an open palm and with the fist
-        that locks it, and how much of the tip motion the fist leaves undone; the stretch of the arm per tip
-        motion [mm/mm] under unit and under virtual stiffness, at the outermost point of the path.
+        One row per arm: ``actuators``; how many of them are free beside the tip (``free_tip``), and beside
+        tip and direction (``free_pose``); the motion of the mid point in percent of the tip motion asked for,
+        with an open palm and with the fist that locks it, and how much of the tip motion the fist leaves
+        ``undone``; the stretch of the arm per tip motion [mm/mm] under unit and under virtual stiffness, at
+        the outermost point of the path.
     """
     rows = []
     for name, bench in benches().items():
@@ -54,13 +55,13 @@ def redundancy() -> pd.DataFrame:
             {
                 "arm": name,
                 "actuators": len(bench.start),
-                "free_at_tip": len(bench.start) - np.linalg.matrix_rank(jacobian[:3]),
-                "free_at_tip_and_direction": max(len(bench.start) - 5, 0),
-                "mid_palm_percent": 100.0 * palm[0],
-                "mid_fist_percent": 100.0 * fist[0],
-                "tip_undone_fist_percent": 100.0 * fist[1],
-                "stretch_unit": unit,
-                "stretch_virtual": virtual,
+                "free_tip": len(bench.start) - np.linalg.matrix_rank(jacobian[:3]),
+                "free_pose": max(len(bench.start) - 5, 0),
+                "palm_percent": 100.0 * palm[0],
+                "fist_percent": 100.0 * fist[0],
+                "undone_percent": 100.0 * fist[1],
+                "unit_stretch": unit,
+                "stiff_stretch": virtual,
             }
         )
     return pd.DataFrame(rows)
@@ -137,15 +138,15 @@ def guidance(rng: np.random.Generator, runs: int = 10) -> pd.DataFrame:
         noisy = [resting_force(AssistAsNeeded(), distance, rng, noise) for _ in range(runs)]
         scaled[share] = {
             "fixed_scaled_N": resting_force(FixedAssistance(), distance),
-            "as_needed_scaled_N": resting_force(AssistAsNeeded(), distance),
-            "as_needed_noisy_N": np.mean(noisy),
+            "needed_scaled_N": resting_force(AssistAsNeeded(), distance),
+            "needed_noisy_N": np.mean(noisy),
         }
     return pd.DataFrame(
         {
             "arm": name,
-            "distance_percent": 100.0 * share,
+            "away_percent": 100.0 * share,
             "fixed_printed_N": resting_force(FixedAssistance(), share * bench.length),
-            "as_needed_printed_N": resting_force(AssistAsNeeded(), share * bench.length),
+            "needed_printed_N": resting_force(AssistAsNeeded(), share * bench.length),
             **scaled[share],
         }
         for (name, bench), share in product(benches().items(), DISTANCES)
