@@ -29,10 +29,10 @@ def _pipeline() -> list[Row]:
     rng = np.random.default_rng(1)
     scene = BrickScene(1)
     tracker, _ = start_tracker(scene, rng)
-    pose = spiral().pose[10]
     noise = rng.standard_normal((ENDOSCOPE.height, ENDOSCOPE.width), dtype=np.float32)
-    image = photograph(scene, pose, ViewConditions(), noise)
-    frame = tracker.track(image)
+    for pose in spiral().pose[:20]:
+        image = photograph(scene, pose, ViewConditions(), noise)
+        frame = tracker.track(image)
     plain = cv2.ORB.create(600, fastThreshold=10)
     orb = 1e3 * seconds_per_call(lambda: plain.detectAndCompute(image, None))
     size = f"640x480, {frame.features} features, {frame.inliers} inliers"
