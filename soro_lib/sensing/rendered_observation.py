@@ -5,7 +5,7 @@
 :class:`soro_lib.sensing.handover_observation.Observer`. Frame `arm_base`, z down.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -243,34 +243,42 @@ class HandoverVision:
         self, balls: Sequence[list[BallSight]]
     ) -> tuple[NDArray[np.float64] | None, float, list[BallSight | None]]:
         """Return the ball's place (3,), the gap of its rays [m] and the circle taken from each camera."""
-        seeing = [i for i, found in enumerate(balls) if found]
         chosen: list[BallSight | None] = [None] * len(balls)
-        best: tuple[float, NDArray[np.float64], float, tuple[BallSight, ...]] | None = None
-        few = 1 if self.estimator == "thesis" else 3
-        for sights in product(*(balls[i][:few] for i in seeing)) if len(seeing) >= 2 else ():
-            place, gap = self._meet(seeing, sights)
-            if self.estimator != "thesis" and not (
-                gap < self.largest_gap and self._right_size(seeing, sights, place)
-            ):
-                continue
-            if self._last_ball is not None and self.estimator != "thesis":
-                cost = float(np.linalg.norm(place - self._last_ball))
-            else:
-                cost = -sum(sight.fill * sight.radius**2 for sight in sights)
-            if best is None or cost < best[0]:
-                best = cost, place, gap, sights
-        if best is None:
-            self._ball_windows = [None] * len(balls)
+        self._ball_windows = [None] * len(balls)
+        seeing = [i for i, found in enumerate(balls) if found]
+        meetings = list(self._meetings(balls, seeing))
+        if not meetings:
             return None, 0.0, chosen
-        _, place, gap, taken = best
-        self._last_ball = place if self.track else None
+        last = self._last_ball
+        if self.estimator == "thesis" or last is None:
+            place, gap, taken = meetings[0]
+        else:
+            place, gap, taken = min(meetings, key=lambda meeting: float(np.linalg.norm(meeting[0] - last)))
         for i, sight in zip(seeing, taken):
             chosen[i] = sight
-            camera = self.cameras[i].camera
-            reach = 2 * sight.radius + 60
-            shape = camera.height, camera.width
-            self._ball_windows[i] = around(sight.centre, reach, shape) if self.track else None
+            if self.track:
+                camera = self.cameras[i].camera
+                size = camera.height, camera.width
+                self._ball_windows[i] = around(sight.centre, 2 * sight.radius + 60, size)
+        if self.track:
+            self._last_ball = place
         return place, gap, chosen
+
+    def _meetings(
+        self, balls: Sequence[list[BallSight]], seeing: list[int]
+    ) -> Iterator[tuple[NDArray[np.float64], float, tuple[BallSight, ...]]]:
+        """Yield the place, the gap and the circles of every ball that the seeing cameras can agree on, the
+        largest circles first; for the thesis, the largest circles alone, whether they agree or not."""
+        if len(seeing) < 2:
+            return
+        if self.estimator == "thesis":
+            largest = tuple(balls[i][0] for i in seeing)
+            yield (*self._meet(seeing, largest), largest)
+            return
+        for sights in product(*(balls[i][:3] for i in seeing)):
+            place, gap = self._meet(seeing, sights)
+            if gap < self.largest_gap and self._right_size(seeing, sights, place):
+                yield place, gap, sights
 
     def _meet(self, seeing: list[int], sights: tuple[BallSight, ...]) -> tuple[NDArray[np.float64], float]:
         rays = [self.cameras[i].rays([sight.centre]) for i, sight in zip(seeing, sights)]

@@ -8,11 +8,9 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from soro_lib.controllers.handover import HandoverParameters
 from soro_lib.robots.helix_plant import HelixPlant
-from soro_lib.sensing.handover_observation import HandoverObservation
 from soro_lib.sensing.handover_scene import STEREO
 from soro_lib.sensing.rendered_observation import HandoverVision, RenderedObserver, calibrate_on_box
 from soro_lib.studies.soft_handover.handover import handovers, thesis_parameters
@@ -26,19 +24,6 @@ def controllers() -> dict[str, HandoverParameters]:
     """Return the thesis's controller at every step size, and the best one found."""
     settings = {f"thesis, step {alpha}": thesis_parameters(alpha) for alpha in STEP_SIZES}
     return {**settings, "best": best_controller()}
-
-
-class CountingObserver(RenderedObserver):
-    """A rendered observer that reports every look."""
-
-    report: Report = staticmethod(nothing)
-
-    def observe(
-        self, state: NDArray[np.float64], ball: NDArray[np.float64], rng: np.random.Generator
-    ) -> HandoverObservation:
-        """Return what is seen of the true state q (9,) and the true ball (3,) [m]."""
-        self.report(1)
-        return super().observe(state, ball, rng)
 
 
 def rendered_block(
@@ -73,8 +58,7 @@ def rendered_block(
     """
     selection, places = np.random.SeedSequence((seed, block)).spawn(2)
     cameras = calibrate_on_box(STEREO, np.random.default_rng(selection))
-    observer = CountingObserver(HandoverVision(cameras, estimator))
-    observer.report = report
+    observer = RenderedObserver(HandoverVision(cameras, estimator))
     runs, traces = [], []
     for name, parameters in (settings or controllers()).items():
         run, trace = handovers(
@@ -88,6 +72,7 @@ def rendered_block(
             controller=name,
             alpha=parameters.control.step_size,
         )
+        report(len(trace))
         runs.append(run.assign(block=block))
         traces.append(trace.assign(block=block))
     return pd.concat(runs, ignore_index=True), pd.concat(traces, ignore_index=True)
