@@ -6,6 +6,7 @@ it, steps become seconds.
 """
 
 import tomllib
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +30,14 @@ EVENNESS = 0.02
 """Pull of the three shares towards each other in the fit; three numbers that depend on two things need it."""
 
 
+def plant_k_file() -> Path:
+    """Return where the fitted shares are kept: ``data/soft_handover/plant_k.toml``."""
+    return data_directory("soft_handover") / "plant_k.toml"
+
+
 def plant_k() -> AngleLossPlant:
-    """Return plant K with the stored shares (``data/soft_handover/plant_k.toml``)."""
-    stored = tomllib.loads((data_directory("soft_handover") / "plant_k.toml").read_text())
+    """Return plant K with the stored shares."""
+    stored = tomllib.loads(plant_k_file().read_text())
     return AngleLossPlant(tuple(stored["realised"]))
 
 
@@ -75,3 +81,22 @@ def fit_plant_k() -> NDArray[np.float64]:
 
     fit = minimize(misfit, np.full(3, 0.5), method="Nelder-Mead", options={"xatol": 2e-3, "fatol": 1e-8})
     return fit.x
+
+
+def main() -> None:
+    """Fit plant K and store its shares; takes about a minute."""
+    shares = ", ".join(f"{share:.4f}" for share in fit_plant_k())
+    text = (
+        "# Plant K of the handover study: the share of its commanded bending angle that each segment realises.\n"
+        "# Declared calibration to 16, 29 and 14 cm (Vervloet, Section 5.2): "
+        "soro_lib.calibrations.soft_handover.fit_plant_k.\n"
+        f"realised = [{shares}]\n"
+    )
+    partial = plant_k_file().with_suffix(".toml.partial")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(plant_k_file())
+    print(f"wrote {plant_k_file()}: {shares}")
+
+
+if __name__ == "__main__":
+    main()
