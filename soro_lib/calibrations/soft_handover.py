@@ -87,7 +87,8 @@ def main() -> None:
     """Fit plant K and store its shares; takes about a minute."""
     shares = ", ".join(f"{share:.4f}" for share in fit_plant_k())
     text = (
-        "# Plant K of the handover study: the share of its commanded bending angle that each segment realises.\n"
+        "# Plant K of the handover study: the share of its commanded bending angle "
+        "that each segment realises.\n"
         "# Declared calibration to 16, 29 and 14 cm (Vervloet, Section 5.2): "
         "soro_lib.calibrations.soft_handover.fit_plant_k.\n"
         f"realised = [{shares}]\n"
