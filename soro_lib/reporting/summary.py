@@ -77,12 +77,17 @@ def verdict_counts(scorecards: Mapping[str, pd.DataFrame], by: str | None = None
 def readme_block(scorecards: Mapping[str, pd.DataFrame]) -> str:
     """Return the merged scorecard as the README shows it: counts, then every row, folded per paper."""
     counts = verdict_counts(scorecards)
-    cells = [[str(value) for value in record] for record in counts.itertuples(index=False, name=None)]
-    parts = [README_BEGIN, markup.markdown_table([str(name) for name in counts.columns], cells)]
+    by_kind = verdict_counts(scorecards, "kind").groupby("kind", sort=False).sum(numeric_only=True).reset_index()
+    parts = [README_BEGIN, _counts_markdown(counts), _counts_markdown(by_kind)]
     for slug, scorecard in scorecards.items():
         summary = f"<details><summary>{slug}: every row</summary>"
         parts.append("\n\n".join([summary, markup.scorecard_markdown(scorecard), "</details>"]))
     return "\n\n".join([*parts, README_END])
+
+
+def _counts_markdown(counts: pd.DataFrame) -> str:
+    cells = [[str(value) for value in record] for record in counts.itertuples(index=False, name=None)]
+    return markup.markdown_table([str(name) for name in counts.columns], cells)
 
 
 def split_readme(text: str) -> tuple[str, str, str]:
