@@ -77,7 +77,9 @@ def verdict_counts(scorecards: Mapping[str, pd.DataFrame], by: str | None = None
 def readme_block(scorecards: Mapping[str, pd.DataFrame]) -> str:
     """Return the merged scorecard as the README shows it: counts, then every row, folded per paper."""
     counts = verdict_counts(scorecards)
-    by_kind = verdict_counts(scorecards, "kind").groupby("kind", sort=False).sum(numeric_only=True).reset_index()
+    by_kind = (
+        verdict_counts(scorecards, "kind").groupby("kind", sort=False).sum(numeric_only=True).reset_index()
+    )
     parts = [README_BEGIN, _counts_markdown(counts), _counts_markdown(by_kind)]
     for slug, scorecard in scorecards.items():
         summary = f"<details><summary>{slug}: every row</summary>"
