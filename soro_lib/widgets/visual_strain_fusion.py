@@ -40,7 +40,8 @@ class FusionExplorer(ipywidgets.VBox):
     time : ipywidgets.FloatSlider
         Which moment [s].
     switch : ipywidgets.ToggleButtons
-        Whether the lens is covered or the light turned off, from :attr:`start` on.
+        Whether the lens is covered or the light turned off, from :attr:`start` on. Where that lies elsewhere,
+        it moves to a second before the moment shown, so that the switch does what it says to the picture.
     start, duration : ipywidgets.FloatSlider
         When the view is taken away, and for how long [s].
     run : DataFrame
@@ -65,7 +66,8 @@ class FusionExplorer(ipywidgets.VBox):
         self.picture = ipywidgets.Image(format="jpeg", layout={"width": "480px"})
         self.plots = ipywidgets.Image(format="png", layout={"flex": "1 1 560px", "max_width": "820px"})
         self.flight.observe(lambda _: self._load(), "value")
-        for control in (self.switch, self.start, self.duration):
+        self.switch.observe(lambda _: self._switched(), "value")
+        for control in (self.start, self.duration):
             control.observe(lambda _: self._fuse(), "value")
         self.time.observe(lambda _: self.draw(), "value")
         controls = ipywidgets.VBox([self.flight, self.time, self.switch, self.start, self.duration])
@@ -76,8 +78,7 @@ class FusionExplorer(ipywidgets.VBox):
     @property
     def conditions(self) -> ViewConditions | None:
         """What the switch does to the moment shown; None if it does nothing."""
-        taken = self.start.value <= self.time.value < self.start.value + self.duration.value
-        return SWITCHES[self.switch.value] if taken else None
+        return SWITCHES[self.switch.value] if self._in_window else None
 
     def view(self) -> View:
         """Return the picture of the moment shown, searched by the tracker."""
@@ -97,6 +98,16 @@ class FusionExplorer(ipywidgets.VBox):
     @property
     def _step(self) -> int:
         return round(self.time.value / 0.05)
+
+    @property
+    def _in_window(self) -> bool:
+        return self.start.value <= self.time.value < self.start.value + self.duration.value
+
+    def _switched(self) -> None:
+        if SWITCHES[self.switch.value] is None or self._in_window:
+            self._fuse()
+        else:
+            self.start.value = max(self.time.value - 1.0, self.start.min)
 
     def _load(self) -> None:
         self._viewer = FlightViewer(self.flight.value)

@@ -31,8 +31,9 @@ def test_covering_the_lens_loses_the_camera_and_the_fibre_takes_over(explorer):
     explorer.switch.value = "as flown"
     before = explorer.run["camera_mm"].iloc[1280]
     explorer.start.value, explorer.duration.value = 60.0, 5.0
-    explorer.switch.value = "cover the lens"
     explorer.time.value = 64.0
+    explorer.switch.value = "cover the lens"
+    assert explorer.start.value == 60.0
     assert "lost" in explorer.message.value
     moment = explorer.run.iloc[1280]
     assert moment["weight"] == 1
@@ -42,12 +43,20 @@ def test_covering_the_lens_loses_the_camera_and_the_fibre_takes_over(explorer):
 
 
 def test_darkness_does_the_same_and_ends(explorer):
-    explorer.switch.value = "turn off the light"
     explorer.time.value = 62.0
+    explorer.switch.value = "turn off the light"
     assert "lost" in explorer.message.value
     explorer.time.value = 70.0
     assert explorer.conditions is None
     assert "features fit" in explorer.message.value
+    explorer.switch.value = "as flown"
+
+
+def test_a_switch_acts_on_the_moment_shown(explorer):
+    explorer.time.value, explorer.start.value = 30.0, 100.0
+    explorer.switch.value = "cover the lens"
+    assert explorer.start.value == 29.0
+    assert "lost" in explorer.message.value
     explorer.switch.value = "as flown"
 
 
