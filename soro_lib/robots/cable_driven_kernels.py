@@ -87,11 +87,15 @@ def _kinematics(q: Array, parameters: Array) -> tuple[Array, Array, Array, Array
     """Return tip, mid and direction (3,) and their Jacobians (3, 7)."""
     _, _, _, _, _, cap = parameters
     soft, soft_slope = _soft_segments(q, parameters)
-    pieces = np.zeros((5, 3))
-    pieces[0, 2], pieces[2, 2], pieces[4, 2] = q[0], cap, cap
-    pieces[1], pieces[3] = soft[0], soft[1]
-    mid_frame, mid_velocities = chain_frame_and_jacobian(pieces[:3])
+    step = 2 if cap > 0 else 1  # a cap is a straight piece after each soft one
+    pieces = np.zeros((2 * step, 3))
+    pieces[0], pieces[step] = soft[0], soft[1]
+    if cap > 0:
+        pieces[1, 2] = pieces[3, 2] = cap
+    mid_frame, mid_velocities = chain_frame_and_jacobian(pieces[:step])
     tip_frame, tip_velocities = chain_frame_and_jacobian(pieces)
+    mid_frame[2, 3] += q[0]
+    tip_frame[2, 3] += q[0]
     direction = np.ascontiguousarray(tip_frame[:, 2])
     turning = tip_velocities.copy()
     turning[:3] = 0.0
@@ -104,11 +108,11 @@ def _kinematics(q: Array, parameters: Array) -> tuple[Array, Array, Array, Array
             for u in range(3):
                 proximal, distal = soft_slope[u, column], soft_slope[3 + u, column]
                 tip_jacobian[row, column] += (
-                    tip_velocities[row, 3 + u] * proximal + tip_velocities[row, 9 + u] * distal
+                    tip_velocities[row, u] * proximal + tip_velocities[row, 3 * step + u] * distal
                 )
-                mid_jacobian[row, column] += mid_velocities[row, 3 + u] * proximal
+                mid_jacobian[row, column] += mid_velocities[row, u] * proximal
                 direction_jacobian[row, column] += (
-                    turning[row, 3 + u] * proximal + turning[row, 9 + u] * distal
+                    turning[row, u] * proximal + turning[row, 3 * step + u] * distal
                 )
     tip, mid = tip_frame[:, 3].copy(), mid_frame[:, 3].copy()
     return tip, mid, direction, tip_jacobian, mid_jacobian, direction_jacobian
