@@ -60,14 +60,15 @@ def suggestions() -> dict[str, HandoverParameters]:
     }
 
 
-def compare_suggestions(
+def compare_controllers(
+    controllers: Mapping[str, HandoverParameters],
     plants: Mapping[str, HelixPlant],
     observers: Mapping[str, Observer],
     repetitions: int,
     seed: int,
-    step_limit: int = 150,
+    step_limit: int,
 ) -> pd.DataFrame:
-    """Return all runs of all suggestions on all plants and through all eyes, one row per run."""
+    """Return all runs of all controllers on all plants and through all eyes, one row per run."""
     tables = [
         handovers(
             parameters,
@@ -82,9 +83,20 @@ def compare_suggestions(
         )[0]
         for plant_name, plant in plants.items()
         for observer_name, observer in observers.items()
-        for name, parameters in suggestions().items()
+        for name, parameters in controllers.items()
     ]
     return pd.concat(tables, ignore_index=True)
+
+
+def compare_suggestions(
+    plants: Mapping[str, HelixPlant],
+    observers: Mapping[str, Observer],
+    repetitions: int,
+    seed: int,
+    step_limit: int = 150,
+) -> pd.DataFrame:
+    """Return all runs of all suggestions, one row per run; see `compare_controllers`."""
+    return compare_controllers(suggestions(), plants, observers, repetitions, seed, step_limit)
 
 
 def compare_eyes(
@@ -104,23 +116,7 @@ def compare_eyes(
         "thesis, step 0.4": thesis_parameters(0.4),
         "best": best_controller(),
     }
-    tables = [
-        handovers(
-            parameters,
-            plant,
-            observer,
-            repetitions,
-            seed,
-            step_limit=step_limit,
-            plant=plant_name,
-            observer=observer_name,
-            controller=name,
-        )[0]
-        for plant_name, plant in plants.items()
-        for observer_name, observer in observers.items()
-        for name, parameters in controllers.items()
-    ]
-    return pd.concat(tables, ignore_index=True)
+    return compare_controllers(controllers, plants, observers, repetitions, seed, step_limit)
 
 
 def loop_speed(
