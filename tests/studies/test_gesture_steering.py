@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from soro_lib.calibrations.gesture_steering import POINTS, printed_positions, table2_poses
+from soro_lib.datacards import DataCardError
 from soro_lib.project import data_directory
 from soro_lib.reporting.equations import index_problems
 from soro_lib.reporting.scorecard import build_scorecard
@@ -213,3 +214,13 @@ def test_arithmetic_of_the_scorecard():
     differs = set(arithmetic.index[arithmetic["verdict"] == "differs"])
     assert differs == {"table1_axial_stiffness_high", "s3d_gesture_combinations", "table2_c2_tip_error_y"}
     assert (card.loc[[f"table2_c1_{point}_sim_z" for point in POINTS], "verdict"] != "reproduced").all()
+
+
+def test_a_missing_shipped_recording_is_named_with_its_place(monkeypatch, tmp_path):
+    folder = tmp_path / "gesture_steering" / "recordings"
+    folder.mkdir(parents=True)
+    card = "steering_minute.csv.gz.card.toml"
+    (folder / card).write_bytes((data_directory("gesture_steering") / "recordings" / card).read_bytes())
+    monkeypatch.setattr(hands, "data_directory", lambda slug: tmp_path / slug)
+    with pytest.raises(DataCardError, match=r"recordings/steering_minute\.csv\.gz: no such"):
+        hands.load_recording("steering_minute")

@@ -66,7 +66,7 @@ def recording_path(name: str) -> Path:
         ``steering_minute``, ``a4_palm``, ``a4_finger``, ``hover``, or the path of a file.
     """
     shipped = data_directory("gesture_steering") / "recordings" / f"{name}.csv.gz"
-    return shipped if shipped.is_file() else Path(name)
+    return shipped if name in ABOUT else Path(name)
 
 
 def shipped_recordings(seed: int = RECORDING_SEED) -> dict[str, pd.DataFrame]:
