@@ -3,17 +3,18 @@
 import os
 import re
 from collections.abc import Mapping
-from io import BytesIO
 from pathlib import Path
 
 import pandas as pd
 from IPython.display import HTML, Image, display
 from matplotlib.figure import Figure
 
-from soro_lib.project import output_directory
-from soro_lib.reporting import markup, policy
+from soro_lib.project import figures_directory, output_directory
+from soro_lib.reporting import markup, policy, resolution
 from soro_lib.reporting.card import load_card
 from soro_lib.reporting.equations import load_equations, load_errata
+from soro_lib.reporting.picture import stored_digest
+from soro_lib.reporting.recording import Recording
 from soro_lib.reporting.scorecard import build_scorecard
 from soro_lib.studies.findings import Finding
 
@@ -21,11 +22,23 @@ SHOWN_DPI = 110
 """Size at which a notebook shows a figure [CSS pixels per inch]; the file has `policy.DPI`."""
 
 
-def as_image(figure: Figure) -> Image:
-    """Return a figure as the PNG that notebooks show; the same figure gives the same bytes."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=policy.DPI, metadata={"Software": None})
-    return Image(data=buffer.getvalue(), format="png", width=round(SHOWN_DPI * figure.get_size_inches()[0]))
+def as_image(figure: Figure, finished: Path | None = None) -> Image:
+    """Return a figure as the PNG that notebooks show; the same figure gives the same bytes.
+
+    Parameters
+    ----------
+    figure
+        What to draw.
+    finished
+        Where an earlier run may have left this picture. If what it shows differs in nothing but the last bits
+        of coordinates, its bytes are taken and nothing is drawn.
+    """
+    recording = Recording.of(figure, policy.DPI)
+    if finished is not None and stored_digest(finished) == recording.digest:
+        data = finished.read_bytes()
+    else:
+        data = recording.png()
+    return Image(data=data, format="png", width=round(SHOWN_DPI * figure.get_size_inches()[0]))
 
 
 class Page:
@@ -53,7 +66,7 @@ class Page:
         display(HTML(markup.card_html(load_card(self.slug))))
 
     def figure(self, figure: Figure, name: str) -> None:
-        """Save a figure as ``<name>.png`` and show it.
+        """Save a figure as ``<name>.png`` and show it; an unchanged one keeps the bytes of its last run.
 
         Raises
         ------
@@ -61,22 +74,23 @@ class Page:
             If `name` has other characters than lower-case letters, digits and underscores.
         """
         path = self._path(name, "png")
-        image = as_image(figure)
+        image = as_image(figure, figures_directory(self.slug) / path.name)
         partial = path.with_suffix(".png.partial")
         partial.write_bytes(image.data)
         os.replace(partial, path)
         display(image)
 
     def table(self, table: pd.DataFrame, name: str) -> None:
-        """Save a table as ``<name>.csv`` without its index, six significant digits, and show it.
+        """Save a table as ``<name>.csv`` without its index, rounded by the units of its columns, and show it.
 
         Raises
         ------
         ValueError
             As `figure`.
         """
-        self._write(table, name)
-        self.show(table)
+        written = resolution.rounded_table(table)
+        self._write(written, name)
+        self.show(written)
 
     def show(self, table: pd.DataFrame) -> None:
         """Show a table without saving it."""

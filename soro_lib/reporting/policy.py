@@ -24,7 +24,10 @@ BOOTSTRAP_SEED = 20260101
 """Seed of the resampling alone; the experiments have their own [-]."""
 
 FLOAT_FORMAT = "%.6g"
-"""How tables write a number: enough digits for every published one, few enough to be the same everywhere."""
+"""How tables write a number: enough digits for every published one, few enough to be the same everywhere.
+
+How small it may be before it is written as zero is said by `soro_lib.reporting.resolution`.
+"""
 
 DPI = 150
 """Resolution of every saved figure [pixels per inch]."""

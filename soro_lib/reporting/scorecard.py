@@ -5,9 +5,8 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
-from scipy.stats import bootstrap
 
-from soro_lib.reporting import policy
+from soro_lib.reporting import policy, resolution
 from soro_lib.reporting.published import PublishedNumber, load_published
 from soro_lib.reporting.tabular import suggestion
 from soro_lib.studies.findings import STATISTICS, Finding
@@ -56,6 +55,8 @@ def confidence_interval(finding: Finding) -> tuple[float, float]:
     """
     if finding.seeds == 1:
         return math.nan, math.nan
+    from scipy.stats import bootstrap  # takes longer to import than all the rest of a small notebook
+
     result = bootstrap(
         (np.asarray(finding.samples),),
         STATISTICS[finding.statistic],
@@ -128,19 +129,20 @@ def _check(slug: str, numbers: Mapping[str, PublishedNumber], findings: Mapping[
 def _judge(number: PublishedNumber, finding: Finding | None) -> dict[str, object]:
     """Return one row of the scorecard."""
     # The verdict is that of the number as written, so that it follows from the table a reader sees.
-    ours = None if finding is None else float(policy.FLOAT_FORMAT % finding.value)
+    unit = number.unit
+    ours = None if finding is None else float(resolution.rounded(finding.value, unit))
     low, high = (math.nan, math.nan) if finding is None else confidence_interval(finding)
     return {
         "id": number.id,
         "location": number.location,
         "quantity": number.quantity,
-        "unit": number.unit,
+        "unit": unit,
         "kind": number.kind,
         "role": number.role,
         "published": number.value,
         "ours": math.nan if ours is None else ours,
-        "low": low,
-        "high": high,
+        "low": float(resolution.rounded(low, unit)),
+        "high": float(resolution.rounded(high, unit)),
         "seeds": pd.NA if finding is None else finding.seeds,
         "tolerance": number.tolerance,
         "verdict": verdict(number.role, number.value, ours, number.tolerance),
