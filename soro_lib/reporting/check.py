@@ -7,18 +7,20 @@ import argparse
 import json
 import subprocess
 import sys
+import tarfile
 import tomllib
-from collections.abc import Callable
-from io import StringIO
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-import pandas as pd
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from soro_lib import datacards
 from soro_lib.project import ROOT, SLUGS
-from soro_lib.reporting import policy, summary
+from soro_lib.reporting import compare, summary
 from soro_lib.reporting.equations import index_problems
 from soro_lib.reporting.scorecard import stale_verdicts
 from soro_lib.reporting.tabular import TableError
@@ -68,54 +70,25 @@ def notebooks(root: Path = ROOT) -> list[str]:
 
 
 def figures(root: Path = ROOT) -> list[str]:
-    """Return where ``figures/`` as the last run wrote it differs from what is committed.
+    """Return where ``figures/`` as the last run wrote it differs from what is committed."""
+    with committed(root, "figures") as before:
+        found = compare.differences(before, root / "figures")
+    return [f"figures/{difference}; look why, then commit or remove it" for difference in found]
 
-    Tables are compared number by number (`policy.same_number`), of images only the names, since another
-    version of the font renderer draws other pixels.
+
+@contextmanager
+def committed(root: Path, folder: str) -> Iterator[Path]:
+    """Give a folder as it is committed, as a temporary copy.
+
+    Raises
+    ------
+    RuntimeError
+        If git does not know the folder.
     """
-    committed = set(_git(root, "ls-tree", "-r", "-z", "--name-only", "HEAD", "figures").split("\0")) - {""}
-    written = {str(path.relative_to(root)) for path in (root / "figures").rglob("*") if path.is_file()}
-    problems = [
-        f"{name}: committed, but the last run did not write it; remove it" for name in committed - written
-    ]
-    problems += [
-        f"{name}: written by the last run, but not committed; add it" for name in written - committed
-    ]
-    for name in sorted(committed & written):
-        if name.endswith(".csv"):
-            before = pd.read_csv(
-                StringIO(_git(root, "show", f"HEAD:{name}")), dtype=str, keep_default_na=False
-            )
-            after = pd.read_csv(root / name, dtype=str, keep_default_na=False)
-            problems += [
-                f"{name}: {what}; look why, then commit it" for what in table_differences(before, after)
-            ]
-    return sorted(problems)
-
-
-def table_differences(before: pd.DataFrame, after: pd.DataFrame) -> list[str]:
-    """Return where two tables of text cells differ by more than the policy allows, one text per column."""
-    if list(before.columns) != list(after.columns):
-        return [f"columns {','.join(before.columns)} became {','.join(after.columns)}"]
-    if len(before) != len(after):
-        return [f"{len(before)} rows became {len(after)}"]
-    problems = []
-    for column in before.columns:
-        changed = [
-            f"line {line}: {old!r} became {new!r}"
-            for line, (old, new) in enumerate(zip(before[column], after[column], strict=True), start=2)
-            if old != new and not _same_cell(old, new)
-        ]
-        if changed:
-            problems.append(f"column {column}, {changed[0]} ({len(changed)} of {len(before)} rows changed)")
-    return problems
-
-
-def _same_cell(old: str, new: str) -> bool:
-    try:
-        return policy.same_number(float(old), float(new))
-    except ValueError:
-        return False
+    archive = _git(root, "archive", "--format=tar", "HEAD", folder)
+    with TemporaryDirectory() as copy, tarfile.open(fileobj=BytesIO(archive)) as files:
+        files.extractall(copy, filter="data")
+        yield Path(copy) / folder
 
 
 def scorecards(root: Path = ROOT) -> list[str]:
@@ -183,11 +156,11 @@ def _locked_versions(path: Path) -> dict[str, list[str]]:
     return versions
 
 
-def _git(root: Path, *arguments: str) -> str:
+def _git(root: Path, *arguments: str) -> bytes:
     """Return what git prints; raises RuntimeError where it fails."""
-    result = subprocess.run(["git", *arguments], cwd=root, capture_output=True, text=True, check=False)
+    result = subprocess.run(["git", *arguments], cwd=root, capture_output=True, check=False)
     if result.returncode:
-        raise RuntimeError(f"git {arguments[0]} failed in {root}: {result.stderr.strip()}")
+        raise RuntimeError(f"git {arguments[0]} failed in {root}: {result.stderr.decode().strip()}")
     return result.stdout
 
 

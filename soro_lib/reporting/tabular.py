@@ -36,7 +36,7 @@ def suggestion(word: str, vocabulary: Iterable[str]) -> str:
     return f" (did you mean {' or '.join(map(repr, close))}?)" if close else ""
 
 
-def read_rows(path: Path, columns: Sequence[str], key: str) -> list[Row]:
+def read_rows(path: Path, columns: Sequence[str], key: str | None) -> list[Row]:
     """Read a UTF-8 CSV file with exactly the given header; a byte-order mark is skipped, blank lines too.
 
     Parameters
@@ -46,7 +46,7 @@ def read_rows(path: Path, columns: Sequence[str], key: str) -> list[Row]:
     columns
         The header, in order.
     key
-        The column whose cells must be filled and unique.
+        The column whose cells must be filled and unique, None if there is none.
 
     Returns
     -------
@@ -85,12 +85,13 @@ def read_rows(path: Path, columns: Sequence[str], key: str) -> list[Row]:
             problems.append(f"{shown(path)}, line {line}: {len(record)} cells, expected {len(columns)}")
             continue
         row = Row(line, dict(zip(columns, (cell.strip() for cell in record), strict=True)))
-        if not row[key]:
+        name = str(line) if key is None else row[key]
+        if not name:
             problems.append(f"{shown(path)}, line {line}, column {key}: missing, every row needs one")
-        elif row[key] in first_line:
+        elif name in first_line:
             where = f"{shown(path)}, line {line}, column {key}"
-            problems.append(f"{where}: {row[key]!r} is already on line {first_line[row[key]]}")
-        first_line.setdefault(row[key], line)
+            problems.append(f"{where}: {name!r} is already on line {first_line[name]}")
+        first_line.setdefault(name, line)
         rows.append(row)
     raise_all(problems)
     return rows

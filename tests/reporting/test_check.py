@@ -3,7 +3,6 @@
 import json
 import subprocess
 
-import pandas as pd
 import pytest
 
 from soro_lib import datacards
@@ -41,43 +40,26 @@ def test_untouched_project_passes(project):
     assert check.readme(project) == []
 
 
-def test_rounding_is_the_same_number_but_a_change_is_told(project):
+def test_a_changed_table_is_told_but_not_its_rounding(project):
     path = project / "figures" / "shared_control" / "table1.csv"
     path.write_text("name,error_mm,count\na,1.00005,3\nb,,4\n")
     assert check.figures(project) == []
-    path.write_text("name,error_mm,count\na,1.01,3\nb,2,4\n")
+    path.write_text("name,error_mm,count\na,1.01,3\nb,,4\n")
     (problem,) = check.figures(project)
-    assert (
-        "shared_control/table1.csv: column error_mm, line 2: '1.00000' became '1.01' (2 of 2 rows" in problem
-    )
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("name,error_mm,count\na,1.0,3\n", "2 rows became 1"),
-        ("name,error_cm,count\na,1.0,3\nb,,4\n", "columns name,error_mm,count became name,error_cm,count"),
-        ("name,error_mm,count\na,1.0,3\nc,,4\n", "column name, line 3: 'b' became 'c'"),
-        ("name,error_mm,count\na,nan,3\nb,,4\n", "'1.00000' became 'nan'"),
-    ],
-)
-def test_changed_shape_or_text_is_told(project, text, said):
-    (project / "figures" / "shared_control" / "table1.csv").write_text(text)
-    assert said in check.figures(project)[0]
+    assert problem.startswith("figures/shared_control/table1.csv, a, error_mm: 1.00000 became 1.01; look why")
 
 
 def test_missing_and_uncommitted_files_are_told(project):
     (project / "figures" / "shared_control" / "fig01.png").unlink()
     (project / "figures" / "shared_control" / "fig02.png").write_bytes(b"new")
-    assert check.figures(project) == [
-        "figures/shared_control/fig01.png: committed, but the last run did not write it; remove it",
-        "figures/shared_control/fig02.png: written by the last run, but not committed; add it",
-    ]
+    gone, new = check.figures(project)
+    assert gone.startswith("figures/shared_control/fig01.png: a file became nothing;")
+    assert new.startswith("figures/shared_control/fig02.png: nothing became a file;")
 
 
 def test_without_git_the_check_says_so(tmp_path, monkeypatch):
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
-    with pytest.raises(RuntimeError, match="git ls-tree failed"):
+    with pytest.raises(RuntimeError, match="git archive failed"):
         check.figures(tmp_path)
 
 
@@ -160,8 +142,3 @@ def test_main_prints_every_check_and_fails_when_one_does(monkeypatch, capsys):
     ]
     monkeypatch.setattr(check, "CHECKS", {"good": list})
     assert check.main([]) == 0
-
-
-def test_tables_with_equal_numbers_written_differently_are_equal():
-    one, two = (pd.DataFrame({"a": [text]}) for text in ("1e-3", "0.001"))
-    assert check.table_differences(one, two) == []
