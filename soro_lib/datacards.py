@@ -4,6 +4,7 @@ A card holds a description, the meaning and unit of every column, the generator 
 the SHA-256 of the file: a file that was changed without its card is noticed before anything is built on it.
 """
 
+import argparse
 import hashlib
 import json
 import tomllib
@@ -14,6 +15,25 @@ from typing import Any
 
 class DataCardError(ValueError):
     """A data file and its card do not agree; the message says which file, what differs and how to mend it."""
+
+
+def generator_options(description: str, output: Path) -> argparse.ArgumentParser:
+    """Return the command line that every generator of data takes: where to write, and whether a small form.
+
+    The small form goes through all of the code in little time; a comparison of its bytes before and after a
+    change says whether the generator still does the same.
+
+    Parameters
+    ----------
+    description
+        What the generator makes.
+    output
+        The folder that it writes to if nothing else is asked for.
+    """
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--output", type=Path, default=output, metavar="DIR", help="folder to write to")
+    parser.add_argument("--small", action="store_true", help="all of the code, little of the data")
+    return parser
 
 
 def card_path(path: Path) -> Path:

@@ -14,6 +14,7 @@ from scipy.optimize import minimize
 
 from soro_lib.controllers.handover import HandoverController, HandoverParameters
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
+from soro_lib.datacards import generator_options
 from soro_lib.project import data_directory
 from soro_lib.reporting.published import load_published
 from soro_lib.robots.helix_plant import AngleLossPlant
@@ -68,8 +69,11 @@ def final_distances(realised: NDArray[np.float64], step_limit: int = 120) -> NDA
     return 1e-3 * np.mean(ends, axis=0)
 
 
-def fit_plant_k() -> NDArray[np.float64]:
-    """Return the three shares that bring the final distances closest to the printed 16, 29 and 14 cm."""
+def fit_plant_k(iterations: int | None = None) -> NDArray[np.float64]:
+    """Return the three shares that bring the final distances closest to the printed 16, 29 and 14 cm.
+
+    The search ends when it has converged, or after a number of `iterations`.
+    """
     printed = load_published("soft_handover")
     target = 1e-2 * np.array([printed[row].value for row in FITTED_ROWS])
 
@@ -79,13 +83,16 @@ def fit_plant_k() -> NDArray[np.float64]:
         unevenness = EVENNESS * (realised - realised.mean())
         return float(np.sum((final_distances(realised) - target) ** 2) + np.sum(unevenness**2))
 
-    fit = minimize(misfit, np.full(3, 0.5), method="Nelder-Mead", options={"xatol": 2e-3, "fatol": 1e-8})
+    options = {"xatol": 2e-3, "fatol": 1e-8, "maxiter": iterations}
+    fit = minimize(misfit, np.full(3, 0.5), method="Nelder-Mead", options=options)
     return fit.x
 
 
 def main() -> None:
     """Fit plant K and store its shares; takes about a minute."""
-    shares = ", ".join(f"{share:.4f}" for share in fit_plant_k())
+    options = generator_options("Fit plant K again.", data_directory("soft_handover")).parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    shares = ", ".join(f"{share:.4f}" for share in fit_plant_k(iterations=2 if options.small else None))
     text = (
         "# Plant K of the handover study: the share of its commanded bending angle "
         "that each segment realises.\n"
@@ -93,10 +100,11 @@ def main() -> None:
         "soro_lib.calibrations.soft_handover.fit_plant_k.\n"
         f"realised = [{shares}]\n"
     )
-    partial = plant_k_file().with_suffix(".toml.partial")
+    path = options.output / plant_k_file().name
+    partial = path.with_suffix(".toml.partial")
     partial.write_text(text, encoding="utf-8")
-    partial.replace(plant_k_file())
-    print(f"wrote {plant_k_file()}: {shares}")
+    partial.replace(path)
+    print(f"wrote {path}: {shares}")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ hypothesis. No hybrid number is read; the hybrid columns are predictions of the 
     python -m soro_lib.calibrations.visual_strain_fusion --check    # verify the stored optimum
 """
 
-import argparse
 import csv
 import sys
 import tomllib
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, differential_evolution
 
 from soro_lib.controllers.hybrid import HybridController, HybridSettings
+from soro_lib.datacards import generator_options
 from soro_lib.project import data_directory
 from soro_lib.robots.pneumatic import PneumaticArm
 from soro_lib.robots.pneumatic_plant import ChamberParameters, PneumaticPlant
@@ -101,14 +101,17 @@ def misfit(candidates: Array, cap: float) -> Array:
     return np.asarray(np.sqrt(np.mean(ratio**2, axis=(1, 2, 3))), dtype=np.float64)
 
 
-def search(cap: float, generations: int = GENERATIONS) -> tuple[Array, float]:
-    """Search the nine parameters from scratch; return them and their misfit."""
+def search(cap: float, generations: int = GENERATIONS, members: int = 10) -> tuple[Array, float]:
+    """Search the nine parameters from scratch, with so many members of each generation per parameter.
+
+    Returns the parameters and their misfit.
+    """
     result = differential_evolution(
         # scipy's stubs do not know the vectorised form, which returns one value per candidate.
         lambda candidates: misfit(candidates, cap),  # type: ignore[arg-type, misc]
         Bounds(*np.array(list(BOUNDS.values())).T),
         maxiter=generations,
-        popsize=10,
+        popsize=members,
         tol=0.0,
         rng=np.random.default_rng(SEED),
         polish=False,
@@ -184,23 +187,23 @@ def check(path: Path) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the calibration or its check; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = generator_options("Fit the pneumatic plant again.", data_directory(SLUG))
     parser.add_argument(
         "--check", action="store_true", help="verify the stored parameters instead of searching"
     )
-    parser.add_argument("--generations", type=int, default=GENERATIONS)
-    parser.add_argument("--output", type=Path, default=plant_file())
     options = parser.parse_args(arguments)
+    path = options.output / plant_file().name
     if options.check:
-        problems = check(options.output)
+        problems = check(path)
         print("\n".join(problems) or "the stored parameters are reproduced")
         return int(bool(problems))
     optima = {}
     for name, cap in CAPS.items():
         print(f"{name}: searching", flush=True)
-        optima[name] = search(cap, options.generations)
-    write(optima, options.output)
-    print(f"wrote {options.output}")
+        optima[name] = search(cap, 1, 1) if options.small else search(cap)
+    options.output.mkdir(parents=True, exist_ok=True)
+    write(optima, path)
+    print(f"wrote {path}")
     return 0
 
 

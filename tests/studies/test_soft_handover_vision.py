@@ -104,8 +104,8 @@ def test_recordings_are_whole_and_every_column_is_explained(tmp_path):
     assert load_vision_noise("three cameras", tmp_path / "vision_noise.toml").wrist_bias == 0.001
 
 
-def test_jobs_cover_all_recordings_and_shrink_with_the_scale():
+def test_jobs_cover_all_recordings_and_shrink_in_the_small_form():
     names = [job.name for job in record.jobs()]
     assert len(names) == len(set(names))
     assert {*record.STUDIES, "vision_still_looks"} <= set(names)
-    assert len(record.jobs(0.1)) < len(names)
+    assert len(record.jobs(small=True)) < len(names)

@@ -88,6 +88,7 @@ def shipped_recordings(seed: int = RECORDING_SEED) -> dict[str, pd.DataFrame]:
 
 def write_recordings(directory: Path, seed: int = RECORDING_SEED) -> None:
     """Write the shipped recordings and their data cards; the same seed gives the same bytes."""
+    directory.mkdir(parents=True, exist_ok=True)
     for name, table in shipped_recordings(seed).items():
         path = directory / f"{name}.csv.gz"
         text = table.to_csv(index=False, lineterminator="\n").encode()

@@ -1,7 +1,10 @@
 """Writes the shipped trials again: ``python -m soro_lib.studies.shared_control``."""
 
+from soro_lib.datacards import generator_options
 from soro_lib.project import data_directory
 from soro_lib.studies.shared_control.recorder import write_shipped_trials
 
 if __name__ == "__main__":
-    write_shipped_trials(data_directory("shared_control") / "trials")
+    # The trials take seconds: their small form is the whole one.
+    parser = generator_options("Record the simulated operators again.", data_directory("shared_control"))
+    write_shipped_trials(parser.parse_args().output / "trials")

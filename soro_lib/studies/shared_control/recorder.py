@@ -182,6 +182,7 @@ SHIPPED_SEED = 20260
 
 def write_shipped_trials(folder: Path) -> list[Path]:
     """Record the trials that come with the workbook, compressed, each with its data card."""
+    folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.csv*"):
         old.unlink()
     written = []

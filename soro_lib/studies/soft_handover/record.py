@@ -6,12 +6,12 @@ a file is written when it is complete, so an interrupted run leaves whole files 
 locked packages give the same bytes, whatever the number of jobs.
 """
 
-import argparse
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
 from dataclasses import dataclass
+from itertools import product
 from multiprocessing import Manager
 from pathlib import Path
 from typing import Any
@@ -21,11 +21,11 @@ import pandas as pd
 from rich.progress import Progress
 
 from soro_lib.calibrations.soft_handover import plant_k
-from soro_lib.datacards import read_card, write_card
+from soro_lib.datacards import generator_options, read_card, write_card
 from soro_lib.project import data_directory
 from soro_lib.robots.helix_plant import ElasticPlant
 from soro_lib.sensing.rendered_observation import ESTIMATORS
-from soro_lib.studies.soft_handover.rendered_handovers import rendered_block
+from soro_lib.studies.soft_handover.rendered_handovers import controllers, rendered_block
 from soro_lib.studies.soft_handover.vision import (
     SEED,
     NoiseSources,
@@ -138,27 +138,21 @@ DESCRIPTIONS = {
 }
 
 
-def jobs(scale: float = 1.0) -> list[Job]:
-    """Return all jobs, the longest first.
-
-    Parameters
-    ----------
-    scale : float
-        Share of the poses and blocks, for a trial.
-    """
-    blocks = max(1, round(scale * BLOCKS))
+def jobs(small: bool = False) -> list[Job]:
+    """Return all jobs, the longest first; in the small form two handovers, and two poses of all else."""
+    plants = ("K", "E")
+    eyes = list(zip(plants, ESTIMATORS)) if small else list(product(plants, ESTIMATORS))
     handovers = [
         Job(
             f"handovers, plant {plant}, {estimator}, block {block}",
-            (plant, estimator, block),
+            (plant, estimator, block, ["best"] if small else list(controllers())),
             LOOKS_PER_BLOCK,
         )
-        for plant in ("K", "E")
-        for estimator in ESTIMATORS
-        for block in range(blocks)
+        for plant, estimator in eyes
+        for block in range(1 if small else BLOCKS)
     ]
-    poses = {name: max(2, round(scale * count)) for name, count in POSES.items()}
-    still = NoiseSources(poses=max(2, round(scale * NoiseSources().poses)))
+    poses = dict.fromkeys(POSES, 2) if small else POSES
+    still = NoiseSources(poses=2) if small else NoiseSources()
     return [
         *handovers,
         *(Job(name, (count,), count) for name, count in poses.items()),
@@ -181,13 +175,15 @@ def run_job(job: Job, progress: Any = None) -> dict[str, pd.DataFrame]:
         return {job.name: STUDIES[job.name](*job.arguments, SEED, report=report)}
     if job.name == "vision_still_looks":
         return {job.name: still_looks(job.arguments[0], SEED, report)}
-    plant, estimator, block = job.arguments
-    return _handovers(plant, estimator, block, report)
+    return _handovers(*job.arguments, report)
 
 
-def _handovers(plant: str, estimator: str, block: int, report: Report) -> dict[str, pd.DataFrame]:
+def _handovers(
+    plant: str, estimator: str, block: int, names: Sequence[str], report: Report
+) -> dict[str, pd.DataFrame]:
     arm = plant_k() if plant == "K" else ElasticPlant()
-    runs, traces = rendered_block(plant, arm, estimator, block, SEED, report)
+    settings = {name: controllers()[name] for name in names}
+    runs, traces = rendered_block(plant, arm, estimator, block, SEED, report, settings)
     return {"rendered_runs": runs, "rendered_traces": traces}
 
 
@@ -234,14 +230,12 @@ def write_noise(figures: dict[str, dict[str, float]], poses: int, directory: Pat
 
 def main(arguments: list[str] | None = None) -> int:
     """Record everything, show the progress and say what was written."""
-    parser = argparse.ArgumentParser(description="Look through the rendered cameras again.")
-    parser.add_argument("--output", type=Path, default=data_directory(SLUG), help="folder to write to")
+    parser = generator_options("Look through the rendered cameras again.", data_directory(SLUG))
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at once")
-    parser.add_argument("--scale", type=float, default=1.0, help="share of the poses and blocks, for a trial")
     parser.add_argument("--only", choices=("vision", "handovers"), help="a part of the recordings")
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
-    todo = [job for job in jobs(options.scale) if options.only in (None, part_of(job))]
+    todo = [job for job in jobs(options.small) if options.only in (None, part_of(job))]
     with Manager() as manager, ProcessPoolExecutor(options.jobs) as pool, Progress() as progress:
         counts = manager.dict()
         bars = {job.name: progress.add_task(job.name, total=job.looks) for job in todo}

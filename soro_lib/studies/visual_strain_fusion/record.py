@@ -4,7 +4,6 @@ Each flight takes some minutes; they run in parallel. A flight is written when i
 interrupted run leaves whole files only. The same seed and the locked packages give the same bytes.
 """
 
-import argparse
 import os
 import signal
 import sys
@@ -17,12 +16,12 @@ from typing import Any
 import numpy as np
 from rich.progress import Progress
 
-from soro_lib.datacards import read_card, write_card
+from soro_lib.datacards import generator_options, read_card, write_card
 from soro_lib.project import data_directory
 from soro_lib.studies.visual_strain_fusion.camera_runs import COLUMNS, FLIGHTS, MAP_ARRAYS, SLUG, fly
 
 SEED = 5
-STEPS = 4000
+STEPS, SMALL_STEPS = 4000, 40
 GENERATOR = "soro_lib.studies.visual_strain_fusion.record"
 
 
@@ -100,16 +99,15 @@ def _record_all(names: Sequence[str], directory: Path, jobs: int, steps: int) ->
 
 def main(arguments: list[str] | None = None) -> int:
     """Record all flights, show the progress and say which files changed."""
-    parser = argparse.ArgumentParser(description="Render and track the camera flights again.")
-    parser.add_argument("--output", type=Path, default=data_directory(SLUG), help="folder to write to")
+    parser = generator_options("Render and track the camera flights again.", data_directory(SLUG))
     parser.add_argument("--jobs", type=int, default=min(len(FLIGHTS), os.cpu_count() or 1))
     parser.add_argument("--only", choices=list(FLIGHTS), help="record one flight only")
-    parser.add_argument("--steps", type=int, default=STEPS, help="frames per flight")
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
-    names = [options.only] if options.only else list(FLIGHTS)
+    names = [options.only] if options.only else list(FLIGHTS)[:: 5 if options.small else 1]
     try:
-        written = _record_all(names, options.output, options.jobs, options.steps)
+        steps = SMALL_STEPS if options.small else STEPS
+        written = _record_all(names, options.output, options.jobs, steps)
     except KeyboardInterrupt:
         for unfinished in options.output.glob("*.part*"):
             unfinished.unlink()
