@@ -2,24 +2,21 @@
 # Needs make and Python >= 3.11; everything else goes into .venv, pinned by environment.txt.
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures quick test check lab bench html lock clean calibrate data
+.PHONY: help env figures quick test check soak golden unchanged lab bench html lock clean calibrate data
 
 PYTHON_CANDIDATES = $(or $(PYTHON),python3.11 python3.12 python3.13 python3.14 python3)
 RUN = .venv/bin/python -m
 JOBS =
 ONLY =
+REF =
+SMALL =
 
 # `make -B` asks for everything anew; the runner knows this as --force.
 FORCE = $(if $(findstring B,$(firstword -$(MAKEFLAGS))),--force)
 RUNNER_OPTIONS = $(FORCE) $(if $(JOBS),--jobs $(JOBS)) $(foreach slug,$(ONLY),--only $(slug))
 
-# What fits a plant or simulates recordings writes its files when it is run as a module.
-MODULES_TO_RUN = $(subst /,.,$(patsubst %/__main__,%,$(basename $(shell grep -rl --include='*.py' '__name__ == "__main__"' $(1)))))
-CALIBRATIONS = $(call MODULES_TO_RUN,soro_lib/calibrations)
-GENERATORS = $(call MODULES_TO_RUN,soro_lib/studies)
-
 help: ## list the commands
-	@echo "make <command>  [JOBS=n: notebooks at once]  [ONLY=slug: this notebook]  [PYTHON=interpreter]"
+	@echo "make <command>  [JOBS=n: notebooks at once]  [ONLY=slug: this notebook]  [PYTHON=interpreter]  [SMALL=1: data and calibrations in small form]"
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  \1	\2/p' Makefile
 
 env: ## set up .venv from environment.txt (the other commands do it themselves)
@@ -38,7 +35,16 @@ quick: env ## run the notebooks with small parameters; writes to build/quick
 	@$(RUN) soro_lib.workbook run --quick $(RUNNER_OPTIONS)
 
 test: env ## run all tests, and every notebook with small parameters
-	@$(RUN) pytest -n logical --dist worksteal
+	@$(RUN) pytest -n logical --dist worksteal -m "not soak"
+
+soak: env ## run what is too long for make test: other kernels, threads and Pythons, kills, many examples
+	@$(RUN) pytest -n logical --dist worksteal -m "soak or hypothesis" --hypothesis-profile soak
+
+golden: env ## keep what a commit writes, tests and offers (REF: that commit)
+	@$(RUN) soro_lib.workbook golden $(REF)
+
+unchanged: figures ## say what this checkout does otherwise than its golden copy
+	@$(RUN) soro_lib.workbook unchanged
 
 check: env ## lint, types, and whether what is committed is what the notebooks produce
 	@status=0; \
@@ -62,10 +68,10 @@ lock: env ## renew environment.txt from pyproject.toml
 	    --generate-hashes --no-emit-index-url --no-header --quiet -o environment.txt
 
 calibrate: env ## fit the declared calibrations again
-	@for module in $(CALIBRATIONS); do echo $$module && $(RUN) $$module || exit 1; done
+	@$(RUN) soro_lib.workbook generate calibrations $(if $(SMALL),--small --output build/small)
 
 data: env ## simulate the recordings in data/ again
-	@for module in $(GENERATORS); do echo $$module && $(RUN) $$module || exit 1; done
+	@$(RUN) soro_lib.workbook generate data $(if $(SMALL),--small --output build/small)
 
 clean: ## remove .venv and everything under build/
 	rm -rf .venv build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -2,12 +2,30 @@
 
 import os
 
-from hypothesis import settings
+import pytest
+from hypothesis import is_hypothesis_test, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
 # The same examples everywhere, and no time limit on one: a busy machine is not a failure.
-settings.register_profile("workbook", deadline=None, derandomize=True)
+settings.register_profile("workbook", deadline=None, derandomize=True, max_examples=50)
+settings.register_profile("soak", settings.get_profile("workbook"))
 settings.load_profile("workbook")
+
+SOAK_FACTOR = 20
+"""How many times more examples `make soak` takes than `make test`."""
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Take many examples under the profile of `make soak`, also of tests that state a number of their own."""
+    if config.getoption("--hypothesis-profile") != "soak":
+        return
+    for test in {getattr(item, "obj", None) for item in items}:
+        if is_hypothesis_test(test):
+            # Hypothesis offers no other way to change the settings of a test that has been decorated.
+            own = test._hypothesis_internal_use_settings
+            test._hypothesis_internal_use_settings = settings(
+                own, max_examples=SOAK_FACTOR * own.max_examples
+            )

@@ -1,4 +1,4 @@
-"""Command line of the runner."""
+"""The command line of the workbook."""
 
 import argparse
 import sys
@@ -6,8 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from soro_lib.project import ROOT
+from soro_lib.reporting import compare
+from soro_lib.reporting.tabular import TableError
+from soro_lib.workbook import golden
 from soro_lib.workbook.display import Display
 from soro_lib.workbook.execution import cores
+from soro_lib.workbook.generators import ROOMS, NothingToRun, generate
 from soro_lib.workbook.notebooks import (
     Notebook,
     NotebookError,
@@ -22,12 +26,26 @@ from soro_lib.workbook.runner import AlreadyRunning, Places, Run, Stopped
 
 
 def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
-    """Run, list or export the notebooks of a project and return the exit status.
+    """Run, list, export or compare the notebooks of a project and return the exit status.
 
-    Zero if all went well, 1 if a notebook failed, 2 if the request made no sense, 128 + signal if stopped.
+    Zero if all went well, 1 if a notebook failed or outputs differ, 2 if the request made no sense,
+    128 + signal if stopped.
     """
     options = _parser().parse_args(arguments)
     try:
+        if options.command == "compare":
+            return _compare(options)
+        if options.command == "digests":
+            for name, digest in compare.digests(compare.outputs(root, options.quick)).items():
+                print(f"{name},{digest}")
+            return 0
+        if options.command == "golden":
+            print(f"golden copy: {golden.build(options.reference or golden.stated_commit())}")
+            return 0
+        if options.command == "unchanged":
+            return _unchanged(options)
+        if options.command == "generate":
+            return generate(options.kind, options.output, options.small)
         notebooks = find_notebooks(root / "notebooks")
         if options.command == "list":
             print(describe(notebooks))
@@ -37,7 +55,15 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
             print(f"open {export(notebooks, places)}")
             return 0
         return _run(options, notebooks, root)
-    except (NotebookError, ParameterError, AlreadyRunning, OSError) as error:
+    except (
+        NotebookError,
+        ParameterError,
+        AlreadyRunning,
+        NothingToRun,
+        golden.GoldenError,
+        TableError,
+        OSError,
+    ) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
 
@@ -67,6 +93,25 @@ def _run(options: argparse.Namespace, notebooks: Mapping[str, Notebook], root: P
     return int(any(outcome.status == "failed" for outcome in outcomes))
 
 
+def _compare(options: argparse.Namespace) -> int:
+    folders = [compare.outputs(place, options.quick) for place in (options.before, options.after)]
+    found = compare.differences(*folders, exact=options.exact)
+    stated = compare.load_exceptions(options.exceptions) if options.exceptions else []
+    unstated = compare.without(found, stated)
+    for difference in unstated:
+        print(difference)
+    files = len({difference.file for difference in unstated})
+    print(f"{len(unstated)} differences in {files} files" if unstated else "no differences", end="")
+    print(f" but for {len(found) - len(unstated)} stated ones" if len(found) > len(unstated) else "")
+    return int(bool(unstated))
+
+
+def _unchanged(options: argparse.Namespace) -> int:
+    problems = golden.unchanged(options.quick)
+    print("\n".join(problems) or f"nothing has changed since {golden.stated_commit()[:12]}")
+    return int(bool(problems))
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m soro_lib.workbook", description=main.__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -86,9 +131,28 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--timeout", type=_positive, metavar="SECONDS", help="longest time for one cell")
     commands.add_parser("list", help="print the notebooks and their parameters")
     html = commands.add_parser("html", help="export the executed notebooks with an index page")
-    for command in (run, html):
+    differ = commands.add_parser("compare", help="say what differs between two output folders")
+    differ.add_argument("before", type=Path, help="folder of outputs, checkout or golden copy")
+    differ.add_argument("after", type=Path, help="what to compare with it")
+    differ.add_argument("--exact", action="store_true", help="compare numbers to the last digit")
+    differ.add_argument(
+        "--except",
+        dest="exceptions",
+        type=Path,
+        metavar="FILE",
+        help="CSV of stated exceptions: file, row, column (* for any), reason",
+    )
+    prints = commands.add_parser("digests", help="print the digest of every table and picture")
+    copy = commands.add_parser("golden", help="keep all that a commit writes, tests, offers and costs")
+    copy.add_argument("reference", nargs="?", help="commit in place of that of tests/golden/commit.toml")
+    same = commands.add_parser("unchanged", help="say what this checkout does otherwise than its golden copy")
+    make = commands.add_parser("generate", help="fit the plants or simulate the recordings again")
+    make.add_argument("kind", choices=list(ROOMS))
+    make.add_argument("--small", action="store_true", help="all of the code, little of the data")
+    for command in (run, html, differ, prints, same):
         command.add_argument("--quick", action="store_true", help="small parameters; in build/quick")
-        command.add_argument("--output", type=Path, metavar="DIR", help="folder in place of figures/")
+    for command in (run, html, make):
+        command.add_argument("--output", type=Path, metavar="DIR", help="folder to write to")
     return parser
 
 

@@ -18,7 +18,7 @@ from papermill.exceptions import PapermillExecutionError
 
 from soro_lib.workbook.notebooks import Notebook
 
-SINGLE_THREAD = (
+THREAD_COUNTS = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
@@ -26,6 +26,9 @@ SINGLE_THREAD = (
     "NUMBA_NUM_THREADS",
     "OPENCV_FOR_THREADS_NUM",
 )
+THREADS = "1"
+"""Threads of a notebook: several notebooks run at once; more threads than cores make all of them slower."""
+
 ENGINE = "soro-workbook"
 
 
@@ -48,7 +51,7 @@ class Execution:
     parameters : mapping
         Values to inject after the parameters cell.
     copy : Path
-        Where papermill writes the executed notebook, cell by cell.
+        Where the executed notebook is written when it has ended, well or not.
     environment : mapping
         Environment of the kernel.
     working_directory : Path
@@ -91,11 +94,13 @@ class Execution:
                 kernel_name="python3",
                 language="python",
                 progress_bar=False,
+                request_save_on_cell_execute=False,  # a save validates the whole notebook, twice a cell
                 execution=self,
             )
         except Exception as error:
             if self.interrupted:
                 raise Interrupted(self.notebook.slug) from None
+            self._keep_what_ran()
             where = f"code cell {self.cell}" if self.cell else "before the first cell"
             raise NotebookFailure(f"{where}: {self._explain(error)}") from error
 
@@ -117,6 +122,11 @@ class Execution:
         if cell.cell_type == "code" and cell.source.strip() and not injected:
             self.cell += 1
             self.on_cell(self.cell)
+
+    def _keep_what_ran(self) -> None:
+        """Write the notebook as far as it has come, where papermill has not done so."""
+        if self.client and not self.copy.exists():
+            nbformat.write(self.client.nb, self.copy)
 
     def _explain(self, error: Exception) -> str:
         match error:
@@ -178,7 +188,7 @@ def kernel_environment(root: Path, output: Path, figures: Path, scratch: Path, j
     names = {".".join(part for part in module.parts if part != "__init__") for module in modules}
     return {
         **os.environ,
-        **dict.fromkeys(SINGLE_THREAD, "1"),
+        **dict.fromkeys(THREAD_COUNTS, THREADS),
         "SORO_OUTPUT": str(output),
         "SORO_FIGURES": str(figures),
         "PYTHONPATH": str(root),

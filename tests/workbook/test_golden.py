@@ -1,0 +1,74 @@
+"""A golden copy holds what a commit does, and a checkout that does otherwise is told."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from soro_lib.project import ROOT
+from soro_lib.workbook import golden
+from soro_lib.workbook.generators import NothingToRun, generators
+from soro_lib.workbook.golden import GoldenError, lost_tests, unresolved
+
+
+def test_a_lost_test_is_told_unless_it_has_a_new_name():
+    before = ["tests/a.py::test_x", "tests/a.py::test_y", "tests/a.py::test_z"]
+    now = ["tests/a.py::test_x", "tests/b.py::test_y"]
+    renames = {"tests/a.py::test_y": "tests/b.py::test_y", "tests/a.py::test_z": ""}
+    assert lost_tests(before, now, renames) == []
+    (lost,) = lost_tests(before, now, {"tests/a.py::test_y": "tests/b.py::test_y"})
+    assert "tests/a.py::test_z is gone" in lost
+    (wrong,) = lost_tests(before[:1], now, {"tests/a.py::test_w": "tests/c.py::test_w"})
+    assert "there is no test tests/c.py::test_w" in wrong
+
+
+def test_imports_of_readme_and_notebooks_are_found_and_resolve():
+    names = golden.imported_names(ROOT)
+    assert "soro_lib.robots:HelixArm" in names
+    assert len(names) > 20
+    assert unresolved(names) == []
+    gone = ["soro_lib.robots:HelixLeg", "soro_lib.nowhere", "soro_lib.nowhere:x"]
+    assert unresolved([*gone, "soro_lib:arcs", "soro_lib.robots:helix"]) == gone
+
+
+def test_digests_see_names_sizes_and_contents(tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "x.csv").write_text("1")
+    before = golden.digests(tmp_path)
+    assert list(before) == ["a/x.csv"]
+    assert before["a/x.csv"].startswith("1 ")
+    (tmp_path / "a" / "x.csv").write_text("2")
+    assert golden.digests(tmp_path) != before
+
+
+def test_what_is_stated_can_be_read_and_names_a_commit():
+    assert len(golden.stated_commit()) == 40
+    golden.compare.load_exceptions(golden.STATED / "exceptions.csv")
+    golden.load_renames(golden.STATED / "renames.csv")
+
+
+def test_an_unknown_commit_is_refused(tmp_path):
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+    with pytest.raises(GoldenError, match="no-such-commit"):
+        golden.build("no-such-commit", tmp_path)
+
+
+def test_every_generator_takes_the_small_form_and_a_folder():
+    found = {**generators("data"), **generators("calibrations")}
+    assert set(found.values()) >= {
+        "gesture_steering",
+        "shared_control",
+        "soft_handover",
+        "visual_strain_fusion",
+    }
+    for module in found:
+        path = ROOT.joinpath(*module.split("."))
+        source = (path / "__main__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
+        assert "generator_options(" in source, module
+
+
+def test_generators_that_cannot_be_found_are_told(tmp_path: Path):
+    (tmp_path / "soro_lib" / "studies").mkdir(parents=True)
+    (tmp_path / "soro_lib" / "studies" / "paper.py").write_text("x = 1\n")
+    with pytest.raises(NothingToRun, match="nothing to run for data in "):
+        generators("data", tmp_path)
