@@ -10,6 +10,13 @@ from hypothesis import strategies as st
 
 from soro_lib.controllers import AssistAsNeeded, FixedAssistance, GoalSelection
 from soro_lib.controllers.shared_control import PARADIGMS, Paradigm, desired_position
+from soro_lib.controllers.shared_control.assist_as_needed import (
+    ASSIST_START,
+    COUNTERS,
+    REACHED,
+    STEADY,
+    assist_step,
+)
 from soro_lib.controllers.shared_control.guidance import damped_magnitude, guidance_force, hooke_magnitude
 
 ITEMS = [[-0.095, 0.117, 0.645], [-0.103, -0.175, 0.645]]
@@ -189,7 +196,7 @@ def steady_then_away(counter):
     return drive(assistance, 0.3 + 0.001 * np.arange(1, 111))
 
 
-def test_the_two_readings_of_the_counter_differ():
+def test_the_printed_readings_of_the_counter_differ():
     text = [result.stiffness for result in steady_then_away("text")]
     caption = [result.stiffness for result in steady_then_away("caption")]
     assert caption[0] > 0  # 1.5 s steady count for the 1 s of moving away
@@ -197,35 +204,159 @@ def test_the_two_readings_of_the_counter_differ():
     assert text[-1] > 0
 
 
-def programmed_stiffness(distances):
-    """The authors' machine from its transition table: a counter, armed (-1) once its limit has passed."""
-    limits = {"steady": 100, "away": 100, "closer": 300}
-    stiffness, counter, previous = [0.0], 0, "start"
+ARMED = -1
+PROGRAM = {  # previous state: state taken up: what happens to the counter, and the delay that limits it
+    "init": {
+        "steady": ("reset", "steady"),
+        "away": ("reset", "away"),
+        "closer": ("reset", "closer"),
+        "reached": ("arm", None),
+    },
+    "steady": {
+        "steady": ("go on", "steady"),
+        "away": ("go on", "away"),
+        "closer": ("reset", "closer"),
+        "reached": ("keep", None),
+    },
+    "away": {
+        "steady": ("go on", "away"),
+        "away": ("go on", "away"),
+        "closer": ("reset", "closer"),
+        "reached": ("arm", None),
+    },
+    "closer": {
+        "steady": ("reset", "steady"),
+        "away": ("reset", "away"),
+        "closer": ("go on", "closer"),
+        "reached": ("arm", None),
+    },
+    "reached": {
+        "steady": ("reset", "steady"),
+        "away": ("reset", "away"),
+        "closer": ("reset", "closer"),
+        "reached": ("arm", None),
+    },
+}
+
+
+def programmed_stiffness(distances, limits, step=0.2, maximum=50.0, near=0.03):
+    """The authors' machine from its transition table: an integer counter, armed once past its limit."""
+    stiffness, counter, previous = [0.0], 0, "init"
     for last, distance in pairwise(distances):
         change = distance - last
         state = "closer" if change < -1e-4 else "away" if change > 1e-4 else "steady"
-        resets = previous == "start" or (previous == "closer") != (state == "closer")
-        if resets:
-            counter = 0
-        if counter >= 0:
-            counter = counter + 1 if counter < limits[state] else -1
-        step = 0.0 if counter >= 0 else -0.2 if state == "closer" else 0.2
-        stiffness.append(min(max(stiffness[-1] + step, 0.0), 50.0))
+        state = "reached" if distance <= near else state
+        action, delay = PROGRAM[previous][state]
+        if action == "arm":
+            counter = ARMED
+        elif action != "keep":
+            counter = 0 if action == "reset" else counter
+            if counter != ARMED:
+                counter = counter + 1 if counter < limits[delay] else ARMED
+        move = {"steady": step, "away": step, "closer": -step, "reached": -step}[state]
+        stiffness.append(min(max(stiffness[-1] + (move if counter == ARMED else 0.0), 0.0), maximum))
         previous = state
     return stiffness
 
 
-@settings(max_examples=30)
-@given(st.lists(st.tuples(st.integers(1, 350), st.sampled_from([-2e-4, 0.0, 2e-4])), min_size=3, max_size=20))
-def test_the_caption_is_the_authors_program(spells):
-    steps = np.concatenate([np.full(count, step) for count, step in spells])
-    distances = 5.0 + np.cumsum(steps)
-    ours = [result.stiffness for result in drive(AssistAsNeeded(counter="caption"), distances)]
-    np.testing.assert_allclose(ours, programmed_stiffness(distances), atol=1e-9)
+def hand(spells):
+    """Distances from spells of (samples, change per sample); no value lies on a threshold."""
+    distances = [0.0332]
+    for count, change in spells:
+        for _ in range(count):
+            distances.append(max(distances[-1] + change, 0.0202))
+    return distances
 
 
-@pytest.mark.parametrize("counter", ["text", "caption"])
-def test_a_spell_of_approach_resets_the_counter_in_both_readings(counter):
+def steps(counter, distances, steady, closer, away):
+    """States of the machine, one per distance; one sample a second, so that delays are whole numbers."""
+    rule = AssistAsNeeded(
+        counter=counter,
+        steady_delay=steady,
+        approach_delay=closer,
+        away_delay=away,
+        stiffness_rate=0.2,
+        steady_speed=1e-4,
+        sample_rate=1.0,
+    ).rule
+    state, states = ASSIST_START, []
+    for distance in distances:
+        state = assist_step(rule, state, distance, 1.0)
+        states.append(state)
+    return states
+
+
+hands = st.lists(
+    st.tuples(st.integers(1, 15), st.sampled_from([-4e-4, 0.0, 4e-4])), min_size=3, max_size=40
+).map(hand)
+delay = st.integers(0, 25)
+
+
+@settings(max_examples=200)
+@given(hands, delay, delay, delay)
+def test_the_program_reading_is_the_authors_machine(distances, steady, closer, away):
+    ours = [state.stiffness for state in steps("program", distances, steady, closer, away)]
+    limits = {"steady": steady, "closer": closer, "away": away}
+    np.testing.assert_allclose(ours, programmed_stiffness(distances, limits), atol=1e-9)
+
+
+def escaped_then_steady(counter):
+    """A hand that drifts off for 1.11 s and then rests; the delays and gains of Table 2."""
+    assistance = AssistAsNeeded(
+        counter=counter,
+        steady_delay=3.0,
+        approach_delay=1.0,
+        away_delay=1.0,
+        maximum_stiffness=100.0,
+        stiffness_rate=50.0,
+    )
+    distances = 0.3 + 0.001 * np.minimum(np.arange(300), 111)
+    return distances, np.array([result.stiffness for result in drive(assistance, distances)])
+
+
+def test_an_armed_counter_of_the_program_outlives_the_escape():
+    """The caption alone has the resting hand wait for xi_S = 3 s; the program pushes it on."""
+    distances, program = escaped_then_steady("program")
+    _, caption = escaped_then_steady("caption")
+    machine = programmed_stiffness(
+        distances, {"steady": 300, "closer": 100, "away": 100}, step=0.5, maximum=100.0
+    )
+    np.testing.assert_allclose(program, machine, atol=1e-9)
+    np.testing.assert_array_equal(caption[:112], program[:112])
+    assert np.all(caption[112:] == caption[111])
+    assert np.max(program - caption) == pytest.approx(94.0)
+
+
+@settings(max_examples=200)
+@given(hands, delay, delay)
+def test_equal_delays_leave_the_program_the_caption_but_for_early_arrivals(distances, poor, closer):
+    """With xi_S = xi_A only whoever comes to the goal from rest, before xi_S has passed, feels a difference:
+    the stiffness falls one sample later."""
+    caption = steps("caption", distances, poor, closer, poor)
+    program = steps("program", distances, poor, closer, poor)
+    early = [
+        before.motion == STEADY and now.motion == REACHED and before.elapsed < poor
+        for before, now in pairwise(caption)
+    ]
+    gaps = np.subtract(*([state.stiffness for state in states] for states in (program, caption)))
+    assert np.all(gaps >= -1e-9)
+    assert np.all(gaps[1:] <= 0.2 * np.cumsum(early) + 1e-9)
+
+
+def test_an_early_arrival_keeps_the_stiffness_for_one_sample():
+    """Built up at rest, then a step toward the goal, a rest too short for xi_S, and the goal."""
+    distances = [0.0362] * 20 + [0.0308] * 3 + [0.0292] * 5
+    caption, program = (
+        np.array([state.stiffness for state in steps(counter, distances, 10, 10, 10)])
+        for counter in ("caption", "program")
+    )
+    np.testing.assert_array_equal(caption[:23], program[:23])
+    np.testing.assert_allclose(program[24:], caption[23:-1], atol=1e-9)
+    assert program[23] == program[22] > caption[23]
+
+
+@pytest.mark.parametrize("counter", ["text", "caption", "program"])
+def test_a_spell_of_approach_resets_the_counter_in_every_reading(counter):
     assistance = AssistAsNeeded(counter=counter)
     drive(assistance, [0.3] * 90)
     drive(assistance, [0.298])
@@ -233,7 +364,7 @@ def test_a_spell_of_approach_resets_the_counter_in_both_readings(counter):
     assert drive(assistance, [0.298] * 2)[-1].stiffness > 0.0
 
 
-@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=200), st.sampled_from(["text", "caption"]))
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=200), st.sampled_from(COUNTERS))
 def test_stiffness_stays_in_bounds_and_moves_at_most_one_step(distances, counter):
     assistance = AssistAsNeeded(
         counter=counter, steady_delay=0.02, away_delay=0.0, approach_delay=0.05, stiffness_rate=2000.0
@@ -380,7 +511,7 @@ def test_bad_parameters_are_named(controller, name, value):
 
 
 def test_unknown_counter_is_refused():
-    with pytest.raises(ValueError, match='counter must be "text" or "caption"'):
+    with pytest.raises(ValueError, match='counter must be "text", "caption" or "program", got'):
         AssistAsNeeded(counter="figure")
 
 

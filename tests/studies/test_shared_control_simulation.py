@@ -10,7 +10,7 @@ import pytest
 
 from soro_lib.controllers import AssistAsNeeded, FixedAssistance, GoalSelection
 from soro_lib.controllers.shared_control import PARADIGMS
-from soro_lib.controllers.shared_control.assist_as_needed import MOTIONS
+from soro_lib.controllers.shared_control.assist_as_needed import COUNTERS, MOTIONS
 from soro_lib.controllers.shared_control.goal_selection import PHASES
 from soro_lib.operators import EXPERT, NAIVE
 from soro_lib.robots.soft_growing_plant import PlantParameters, SoftGrowingPlant, real_arm
@@ -55,10 +55,11 @@ def grasping_trial(name, law="printed", **options):
     return trace
 
 
-@pytest.mark.parametrize("counter", ["text", "caption"])
+@pytest.mark.parametrize("counter", COUNTERS)
 def test_compiled_assist_as_needed_is_the_readable_class(counter):
-    trace = grasping_trial("assist_as_needed", assist_as_needed={"counter": counter})
-    assistance = AssistAsNeeded(counter=counter)
+    options = {"counter": counter, "approach_delay": 0.5, "away_delay": 0.3}
+    trace = grasping_trial("assist_as_needed", assist_as_needed=options)
+    assistance = AssistAsNeeded(**options)
     tips, goals, forces = (columns(trace, name) for name in ("tip_", "goal_", "force_"))
     for index, row in enumerate(trace.itertuples()):
         result = assistance.update(tips[index], goals[index])

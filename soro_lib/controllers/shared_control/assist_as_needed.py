@@ -3,6 +3,7 @@
 Source: Stroppa et al., Eqs. (2) and (3), Fig. 5.
 """
 
+import math
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -20,9 +21,15 @@ from soro_lib.controllers.shared_control.guidance import (
 MOTIONS = ("start", "reached", "steady", "away", "closer")
 START, REACHED, STEADY, AWAY, CLOSER = range(5)
 
+COUNTERS = ("text", "caption", "program")
+TEXT, CAPTION, PROGRAM = range(3)
+
+ARMED = math.inf
+"""The program's counter once it has reached its delay: it stays there until something resets it."""
+
 
 class AssistRule(NamedTuple):
-    """Constants of the assist-as-needed machine, times in samples."""
+    """Constants of the assist-as-needed machine, times in samples; ``counter`` indexes ``COUNTERS``."""
 
     maximum_stiffness: float
     stiffness_step: float
@@ -31,7 +38,7 @@ class AssistRule(NamedTuple):
     steady_delay: float
     approach_delay: float
     away_delay: float
-    shared_counter: bool
+    counter: int
     sample_time: float
 
 
@@ -63,15 +70,35 @@ def classify_motion(rule: AssistRule, previous_distance: float, distance: float,
 
 
 @register_jitable(forceinline=True)
-def reaction_counter(shared: bool, previous: int, motion: int, elapsed: float, samples: float) -> float:
-    """Time tau spent waiting [samples]: zero on entry, then counting.
+def reaction_time(rule: AssistRule, motion: int) -> float:
+    """Delay xi of a state [samples]; there is none at the goal (Erratum SC-6)."""
+    if motion == STEADY:
+        return rule.steady_delay
+    if motion == AWAY:
+        return rule.away_delay
+    if motion == CLOSER:
+        return rule.approach_delay
+    return 0.0
 
-    The text resets it whenever the state changes; the caption of Fig. 5 (``shared``) lets it run on where a
-    steady hand moves away or an escaping one stops.
+
+@register_jitable(forceinline=True)
+def reaction_counter(rule: AssistRule, previous: int, motion: int, elapsed: float, samples: float) -> float:
+    """Time tau spent waiting [samples]: zero on entry, then counting (Erratum SC-2).
+
+    The text resets it whenever the state changes; the caption of Fig. 5 lets it run on where a steady hand
+    moves away or an escaping one stops. So does the program, in which a counter that has reached its delay
+    is ``ARMED``, and stays so: an escaping hand that stops is still held against the delay of moving away
+    (for one sample), and one that stood steady takes its counter with it to the goal.
     """
-    same = motion == previous
+    program = rule.counter == PROGRAM
+    if program and motion == REACHED:
+        return elapsed if previous == STEADY else ARMED
     both_poor = motion in (STEADY, AWAY) and previous in (STEADY, AWAY)
-    return elapsed + samples if same or (shared and both_poor) else 0.0
+    runs_on = motion == previous or (rule.counter != TEXT and both_poor)
+    waited = elapsed + samples if runs_on else 0.0
+    escaped = previous == AWAY and motion == STEADY
+    delay = reaction_time(rule, AWAY if escaped else motion)
+    return ARMED if program and waited >= delay else waited
 
 
 @register_jitable(forceinline=True)
@@ -79,17 +106,14 @@ def stiffness_change(rule: AssistRule, motion: int, elapsed: float) -> float:
     """Direction in which the stiffness moves: +1, 0 or -1 (Stroppa et al., Eq. (3), Errata SC-1, SC-5, SC-6).
 
     It moves once the reaction time has passed, tau >= xi; the printed tau < xi would assist at once and then
-    freeze. At the goal it falls without delay.
+    freeze.
     """
-    if motion == REACHED:
-        return -1.0
-    if motion == STEADY:
-        return 1.0 if elapsed >= rule.steady_delay else 0.0
-    if motion == AWAY:
-        return 1.0 if elapsed >= rule.away_delay else 0.0
-    if motion == CLOSER:
-        return -1.0 if elapsed >= rule.approach_delay else 0.0
-    return 0.0
+    if motion == START:
+        return 0.0
+    delay = ARMED if rule.counter == PROGRAM else reaction_time(rule, motion)
+    if elapsed < delay:
+        return 0.0
+    return 1.0 if motion in (STEADY, AWAY) else -1.0
 
 
 @register_jitable(forceinline=True)
@@ -99,7 +123,7 @@ def assist_step(rule: AssistRule, state: AssistState, distance: float, samples: 
     ``samples`` is the time since the last one in sample periods: 1 for a regular clock.
     """
     motion = classify_motion(rule, state.distance, distance, samples)
-    elapsed = reaction_counter(rule.shared_counter, state.motion, motion, state.elapsed, samples)
+    elapsed = reaction_counter(rule, state.motion, motion, state.elapsed, samples)
     stiffness = state.stiffness + stiffness_change(rule, motion, elapsed) * rule.stiffness_step * samples
     return AssistState(
         stiffness=min(max(stiffness, 0.0), rule.maximum_stiffness),
@@ -128,9 +152,10 @@ class AssistAsNeeded:
         Reaction times xi_S, xi_C, xi_A [s].
     sample_rate : float
         [Hz].
-    counter : {"text", "caption"}
-        Reading of the counter tau. "text" resets it whenever the state changes, "caption" not between
-        steady and away, as Fig. 5 and the authors' program have it.
+    counter : {"text", "caption", "program"}
+        Reading of the counter tau (Erratum SC-2). "text" resets it whenever the state changes; "caption", of
+        Fig. 5, lets it run on between steady and away; "program", the authors', does so too, and there a
+        delay once reached stays reached, whichever of the two states follows.
     unit_direction : bool
         True: the printed law. False: the authors' program, direction not normalised (Erratum SC-9).
 
@@ -163,11 +188,11 @@ class AssistAsNeeded:
         approach_delay: float = 3.0,
         away_delay: float = 1.0,
         sample_rate: float = 100.0,
-        counter: Literal["text", "caption"] = "text",
+        counter: Literal["text", "caption", "program"] = "text",
         unit_direction: bool = True,
     ) -> None:
-        if counter not in ("text", "caption"):
-            raise ValueError(f'counter must be "text" or "caption", got {counter!r}')
+        if counter not in COUNTERS:
+            raise ValueError(f'counter must be "text", "caption" or "program", got {counter!r}')
         self.maximum_force = positive("maximum_force", maximum_force)
         self.sample_rate = positive("sample_rate", sample_rate)
         self.unit_direction = bool(unit_direction)
@@ -179,7 +204,7 @@ class AssistAsNeeded:
             steady_delay=not_negative("steady_delay", steady_delay) * self.sample_rate,
             approach_delay=not_negative("approach_delay", approach_delay) * self.sample_rate,
             away_delay=not_negative("away_delay", away_delay) * self.sample_rate,
-            shared_counter=counter == "caption",
+            counter=COUNTERS.index(counter),
             sample_time=1.0 / self.sample_rate,
         )
         self.reset()

@@ -98,7 +98,7 @@ class TaskSettings:
         Which arm and gripper.
     force_law : {"printed", "program"}
         Unit direction and th_D = 30 mm as printed; or the authors' program: direction not normalised, th_D =
-        50 mm, fixed assistance without damper and silent below 30 mm.
+        50 mm, its own counter tau, fixed assistance without damper and silent below 30 mm.
     assist_as_needed, fixed_assistance : mapping
         Parameters that differ from the defaults of `AssistAsNeeded` and `FixedAssistance`.
     scene : Scene
@@ -138,7 +138,7 @@ class TaskSettings:
             If a parameter is out of bounds or a goal out of reach.
         """
         program = self.force_law == "program"
-        as_needed = {"near_distance": 0.05, "counter": "caption"} if program else {}
+        as_needed = {"near_distance": 0.05, "counter": "program"} if program else {}
         fixed = {"near_distance": 0.03, "damping": 0.0} if program else {}
         assist = AssistAsNeeded(**{**as_needed, **self.assist_as_needed})  # type: ignore[arg-type]
         spring = FixedAssistance(**{**fixed, **self.fixed_assistance})  # type: ignore[arg-type]
