@@ -32,6 +32,9 @@ How small it may be before it is written as zero is said by `soro_lib.reporting.
 DPI = 150
 """Resolution of every saved figure [pixels per inch]."""
 
+QUICK_DPI = 50
+"""Resolution of the figures of a quick run, which show that everything can be drawn [pixels per inch]."""
+
 
 def same_number(first: float, second: float) -> bool:
     """Return whether two runs of the same seed gave the same number; two NaN are the same."""

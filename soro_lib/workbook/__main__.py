@@ -94,8 +94,8 @@ def _run(options: argparse.Namespace, notebooks: Mapping[str, Notebook], root: P
 
 
 def _compare(options: argparse.Namespace) -> int:
-    folders = [compare.outputs(place, options.quick) for place in (options.before, options.after)]
-    found = compare.differences(*folders, exact=options.exact)
+    before, after = (compare.outputs(place, options.quick) for place in (options.before, options.after))
+    found = compare.differences(before, after, options.exact)
     stated = compare.load_exceptions(options.exceptions) if options.exceptions else []
     unstated = compare.without(found, stated)
     for difference in unstated:

@@ -178,7 +178,10 @@ class Run:
             notebook,
             parameters,
             copy=folder / notebook.path.name,
-            environment=kernel_environment(self.places.root, output, self.places.figures, folder, self.jobs),
+            environment={
+                **kernel_environment(self.places.root, output, self.places.figures, folder, self.jobs),
+                "SORO_QUICK": str(int(bool(parameters.get("quick")))),
+            },
             working_directory=work,
             cell_timeout=self.cell_timeout,
             on_cell=lambda number: self.display.cell(notebook.slug, number),

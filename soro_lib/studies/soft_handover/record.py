@@ -175,7 +175,8 @@ def run_job(job: Job, progress: Any = None) -> dict[str, pd.DataFrame]:
         return {job.name: STUDIES[job.name](*job.arguments, SEED, report=report)}
     if job.name == "vision_still_looks":
         return {job.name: still_looks(job.arguments[0], SEED, report)}
-    return _handovers(*job.arguments, report)
+    plant, estimator, block, names = job.arguments
+    return _handovers(plant, estimator, block, names, report)
 
 
 def _handovers(
