@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from soro_lib.reporting import Page, page, policy
+from soro_lib.reporting.picture import DIGEST
 from soro_lib.reporting.plotting import (
     PAGE_WIDTH,
     SERIES,
@@ -88,6 +90,49 @@ def test_failing_figure_leaves_the_old_one(tmp_path, shown):
     with pytest.raises(ValueError, match="undefinedcommand"):
         here.figure(figure, "fig")
     assert (tmp_path / "fig.png").read_bytes() == before
+
+
+@pytest.fixture
+def finished(tmp_path, monkeypatch, shown):
+    """Draw `make_figure` as a run before did, and return its file; the next run writes to another folder."""
+    monkeypatch.setenv("SORO_FIGURES", str(tmp_path / "figures"))
+    folder = tmp_path / "figures" / "paper"
+    folder.mkdir(parents=True)
+    (tmp_path / "staged").mkdir()
+    Page("paper", folder).figure(make_figure(), "fig")
+    return folder / "fig.png"
+
+
+def test_unchanged_figure_keeps_its_bytes_whatever_compressed_them(tmp_path, finished, monkeypatch):
+    with Image.open(finished) as image:
+        text = PngInfo()
+        text.add_text(DIGEST, image.info[DIGEST])
+        image.save(finished, compress_level=1, pnginfo=text)
+    monkeypatch.setattr(page.Recording, "png", lambda recording: pytest.fail("drawn"))
+    Page("paper", tmp_path / "staged").figure(make_figure(), "fig")
+    assert (tmp_path / "staged" / "fig.png").read_bytes() == finished.read_bytes()
+
+
+def test_unchanged_figure_is_shown_too(finished, tmp_path, shown):
+    Page("paper", tmp_path / "staged").figure(make_figure(), "fig")
+    assert shown == [finished.read_bytes()] * 2
+
+
+def test_changed_figure_is_drawn_anew(tmp_path, finished):
+    figure = make_figure()
+    figure.axes[0].get_lines()[0].set_color("#1a1a1b")
+    Page("paper", tmp_path / "staged").figure(figure, "fig")
+    with Image.open(tmp_path / "staged" / "fig.png") as ours, Image.open(finished) as before:
+        assert ours.info[DIGEST] != before.info[DIGEST]
+        assert not np.array_equal(np.asarray(ours), np.asarray(before))
+
+
+def test_damaged_picture_is_drawn_anew(tmp_path, finished):
+    whole = finished.read_bytes()
+    for damaged in (whole[:-500], whole[:2000] + b"?" + whole[2001:], b""):
+        finished.write_bytes(damaged)
+        Page("paper", tmp_path / "staged").figure(make_figure(), "fig")
+        assert (tmp_path / "staged" / "fig.png").read_bytes() == whole
 
 
 def test_scorecard_card_indices_are_shown_and_written(tmp_path, write_paper, shown):
