@@ -306,7 +306,8 @@ class _Digest:
     def add_draw_image(self, x: float, y: float, pixels: NDArray[np.uint8]) -> None:
         """Add an image as it is drawn, pixel by pixel."""
         self.add_numbers([x, y])
-        self.add_words(pixels.shape, np.ascontiguousarray(pixels).tobytes())
+        self.add_words(pixels.shape)
+        self._hash.update(np.ascontiguousarray(pixels).tobytes())
 
     def add_draw_text(
         self,
