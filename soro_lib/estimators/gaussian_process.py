@@ -6,6 +6,7 @@ the inverse of the kernel matrix follows a replaced sample by two rank-one corre
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
@@ -120,12 +121,23 @@ class RollingGaussianProcess:
         remainder = self._diagonal - np.sum(added * correlation, axis=-1)
         added[..., slot] = -1.0
         added /= np.sqrt(remainder)[..., None]
-        left = np.stack([-removed, added], axis=-1)
-        right = np.stack([removed, added], axis=-2)
-        self._inverse += left @ right
+        _exchange(
+            self._inverse.reshape(-1, self.window, self.window),
+            removed.reshape(-1, self.window),
+            added.reshape(-1, self.window),
+        )
 
     def _refresh(self) -> None:
         """Invert the kernel matrix afresh, so that rounding cannot pile up."""
         difference = self._inputs[..., :, None, :] - self._inputs[..., None, :, :]
         kernel = np.exp(-0.5 * np.einsum("...ijn,...ijn->...ij", difference, difference))
         self._inverse = np.linalg.inv(kernel + self.noise**2 * np.eye(self.window))
+
+
+@njit(cache=True)
+def _exchange(inverse: Array, removed: Array, added: Array) -> None:
+    """Add ``added added' - removed removed'`` to matrices ``(n, w, w)`` in place, in one pass over memory."""
+    for k in range(inverse.shape[0]):
+        for i in range(inverse.shape[1]):
+            for j in range(inverse.shape[2]):
+                inverse[k, i, j] += added[k, i] * added[k, j] - removed[k, i] * removed[k, j]

@@ -45,6 +45,14 @@ def test_radial_basis_is_equation_3():
     assert np.allclose(radial_basis(inputs, centres, widths), direct, rtol=1e-12)
 
 
+def test_hidden_output_is_equation_3_of_the_scaled_shifts():
+    learner = network(input_scale=2e-11)
+    shifts, _ = samples(np.random.default_rng(1), 5)
+    expected = radial_basis(shifts / 2e-11, learner.centres, learner.widths)
+    assert np.allclose(learner.hidden_output(shifts), expected, rtol=1e-12)
+    assert np.allclose(learner.hidden_output(shifts[3]), expected[3], rtol=1e-12)
+
+
 def test_additive_nodes_of_equation_4_are_not_the_radial_ones_of_equation_3():
     """Erratum VS-5: phi(a.x + b) and exp(-|x - a|^2 / b) are different functions of the same parameters."""
     rng = np.random.default_rng(1)
@@ -192,8 +200,15 @@ def test_unit_quaternion_has_length_one(values):
 
 
 def test_quaternion_without_a_direction_becomes_the_identity():
-    assert np.array_equal(unit_quaternion(np.zeros(4)), [0, 0, 0, 1])
-    assert np.array_equal(unit_quaternion([np.nan, 0, 0, 1]), [0, 0, 0, 1])
+    broken = np.array([[0.0, 0, 0, 0], [np.nan, 0, 0, 1], [0, np.inf, 0, 1], [1e-10, 0, 0, 0]])
+    assert np.array_equal(unit_quaternion(broken), np.tile([0.0, 0, 0, 1], (4, 1)))
+    for one in broken:
+        assert np.array_equal(unit_quaternion(one), [0, 0, 0, 1])
+
+
+def test_one_quaternion_is_scaled_as_one_of_many():
+    many = np.random.default_rng(15).normal(size=(20, 4))
+    assert np.allclose(unit_quaternion(many), [unit_quaternion(one) for one in many], rtol=1e-15)
 
 
 def test_prediction_is_a_unit_quaternion_even_before_training():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from filterpy.kalman import KalmanFilter
 
 from soro_lib.estimators.handover_filters import (
     APPENDIX_A,
@@ -29,6 +30,26 @@ def test_filter_follows_eqs_14_and_15(noise):
         variance -= gain * variance
         np.testing.assert_allclose(point.state, state, atol=1e-12)
         assert point.variance == pytest.approx(variance)
+
+
+@pytest.mark.parametrize("noise", [APPENDIX_A.wrist, MEASURED_NOISE.ball, MEASURED_NOISE.direction])
+def test_one_variance_for_three_components_is_filterpys_filter(noise):
+    """The readable reference: filterpy with F = H = I, commanded moves and measurements that are missing."""
+    rng = np.random.default_rng(4)
+    start = rng.normal(size=3)
+    point, reference = PointFilter(noise, start), KalmanFilter(dim_x=3, dim_z=3)
+    reference.x, reference.P = start, noise.initial * np.eye(3)
+    reference.F = reference.H = np.eye(3)
+    for _ in range(300):
+        move, measured, deviation = rng.normal(0, 0.01, 3), rng.normal(size=3), 10.0 ** rng.uniform(-5, 0)
+        process = noise.process + noise.move_deviation**2 * (move @ move)
+        point.predict(move)
+        reference.predict(u=noise.expected_move * move, B=np.eye(3), Q=process * np.eye(3))
+        if rng.random() < 0.7:
+            point.update(measured, deviation)
+            reference.update(measured, R=(noise.measurement or deviation**2) * np.eye(3))
+        np.testing.assert_allclose(point.state, reference.x, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(point.variance * np.eye(3), reference.P, rtol=1e-12, atol=0)
 
 
 def test_first_measurement_is_taken_nearly_whole():

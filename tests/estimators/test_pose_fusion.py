@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from filterpy.kalman import KalmanFilter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -154,6 +155,64 @@ def test_filter_reacquires_after_a_jump_and_survives_the_loss_of_both_sensors():
     for _ in range(10):
         pose = fusion.update(there, 1e-7, there, 1e-7)
     assert np.allclose(pose, there, atol=1e-3)
+
+
+def filterpys_fusion(samples, period, acceleration, gate, reacquire):
+    """The readable reference: filterpy's filter of the six states; positions and their covariances."""
+    reference, refused = KalmanFilter(dim_x=6, dim_z=3), 0
+    reference.F[:3, 3:], reference.H[:, :3] = period * np.eye(3), np.eye(3)
+    effect = np.vstack([0.5 * period**2 * np.eye(3), period * np.eye(3)])
+    reference.Q = acceleration**2 * effect @ effect.T
+
+    def start(pose, variance):
+        reference.x = np.concatenate([pose[:3], np.zeros(3)])[:, None]
+        reference.P = np.diag([variance] * 3 + [1e-4] * 3)
+
+    for step, pair in enumerate(samples):
+        usable = [(pose, variance) for pose, variance in pair if variance < np.inf]
+        if step == 0:
+            start(*usable[0])
+        reference.predict()
+        accepted = 0
+        for pose, variance in usable:
+            innovation, spread = pose[:3, None] - reference.x[:3], reference.P[:3, :3] + variance * np.eye(3)
+            if (innovation.T @ np.linalg.inv(spread) @ innovation).item() <= gate:
+                reference.update(pose[:3, None], R=variance * np.eye(3))
+                accepted += 1
+        refused = 0 if accepted else refused + 1
+        if refused >= reacquire and usable:
+            start(*usable[0])
+            refused = 0
+        yield reference.x[:3, 0], reference.P[:3, :3]
+
+
+def fusion_samples(rng, steps):
+    """Random walk seen by two sensors of changing quality, sometimes absent, with outliers and a jump."""
+    truth = np.cumsum(rng.normal(0, 2e-4, (steps, 3)), axis=0)
+    truth[steps // 2 :] += 0.05
+    samples = []
+    for position in truth:
+        pair = []
+        for present in 0.9, 0.95:
+            deviation = 10.0 ** rng.uniform(-4, -3)
+            pose = np.concatenate([position + rng.normal(0, deviation, 3), [0, 0, 0, 1]])
+            if rng.random() < 0.05:
+                pose[:3] += 0.02
+            pair.append((pose, deviation**2) if rng.random() < present else (np.full(7, np.nan), np.inf))
+        samples.append(pair)
+    samples[0] = [(np.array([0, 0, 0, 0, 0, 0, 1.0]), 1e-7)] * 2
+    return samples
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_covariance_for_three_axes_is_filterpys_filter(seed):
+    parameters = {"period": 0.05, "acceleration": 0.05, "gate": 16.3, "reacquire": 5}
+    samples = fusion_samples(np.random.default_rng([7, seed]), 400)
+    fusion = InverseVarianceFusion(**parameters)
+    for pair, (position, covariance) in zip(samples, filterpys_fusion(samples, **parameters)):
+        fused = fusion.update(*pair[0], *pair[1])
+        assert np.allclose(fused[:3], position, rtol=0, atol=1e-12)
+        assert np.allclose(fusion.covariance, covariance, rtol=1e-12, atol=1e-18)
 
 
 def test_filter_without_any_sensor_says_so():
