@@ -112,8 +112,13 @@ class TrackingRun:
 
     def deviation(self, path: Array, every: int = 1) -> Array:
         """Distance between tip and the closest point of a closed path ``(n, 2)``, of every n-th step [m]."""
-        dense = paths.polygon(np.arange(20 * len(path)) / (20 * len(path)), path)
-        return np.asarray(cKDTree(dense).query(self.tip[::every])[0], dtype=np.float64)
+        return path_distance(self.tip[::every], path)
+
+
+def path_distance(tips: Array, path: Array) -> Array:
+    """Distance ``(...)`` between tips ``(..., 2)`` and the closest point of a closed path ``(n, 2)`` [m]."""
+    dense = paths.polygon(np.arange(20 * len(path)) / (20 * len(path)), path)
+    return np.asarray(cKDTree(dense, leafsize=32).query(tips)[0], dtype=np.float64)
 
 
 def track(

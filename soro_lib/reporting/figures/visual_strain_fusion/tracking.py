@@ -16,7 +16,7 @@ from soro_lib.robots.pneumatic_plant import Wall
 from soro_lib.studies.visual_strain_fusion.closed_curve import CurveRun, octopus
 from soro_lib.studies.visual_strain_fusion.hybrid_control import Comparison
 from soro_lib.studies.visual_strain_fusion.motion import PERIOD
-from soro_lib.studies.visual_strain_fusion.tracking import GAINS
+from soro_lib.studies.visual_strain_fusion.tracking import GAINS, path_distance
 
 MODEL: dict[str, Any] = {"color": COLORS["grey"], "linewidth": 1.0}
 HYBRID: dict[str, Any] = {"color": COLORS["blue"], "linewidth": 1.2}
@@ -72,10 +72,11 @@ def _draw_tracking(comparison: Comparison, gain: float, seed: int = 0) -> Figure
     closed = 1e3 * np.vstack([comparison.points, comparison.points[:1]])
     axes[0].plot(*closed.T, **REFERENCE, label="target path")
     for name, (run, style) in runs.items():
-        axes[0].plot(*(1e3 * run.tip[:, seed, column]).T, **style, label=name)
-        time = PERIOD * np.arange(len(run.tip))
+        tips = run.tip[:, seed, column]
+        axes[0].plot(*(1e3 * tips).T, **style, label=name)
+        time = PERIOD * np.arange(len(tips))
         error_axes.plot(time, 1e3 * run.error[:, seed, column], **style)
-        deviation_axes.plot(time, 1e3 * run.deviation(comparison.points)[:, seed, column], **style)
+        deviation_axes.plot(time, 1e3 * path_distance(tips, comparison.points), **style)
     axes[0].set_aspect("equal")
     label_axes(axes[0], "x [mm]", "y [mm]", title=f"Kp = {gain:.2f}")
     label_axes(error_axes, y="error [mm]")
