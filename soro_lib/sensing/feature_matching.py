@@ -1,12 +1,14 @@
 """ORB features of an image, spread over it, and two ways to match them: anywhere, or near a prediction."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from soro_lib.sensing.rendering import Camera
 
@@ -85,11 +87,12 @@ class FeatureDetector:
         size = max(self.camera.width, self.camera.height) / self.cells
         cell = (np.array(cv2.KeyPoint.convert(keypoints)) / size).astype(int)
         index = cell[:, 0] + self.cells * cell[:, 1]
-        order = np.lexsort(([-keypoint.response for keypoint in keypoints], index))
+        response = np.fromiter(map(attrgetter("response"), keypoints), dtype=float, count=len(keypoints))
+        order = np.lexsort((-response, index))
         starts = np.flatnonzero(np.diff(index[order], prepend=-1))
         rank = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
         best = order[np.argsort(rank, kind="stable")]
-        return [keypoints[k] for k in best[: self.count]]
+        return [keypoints[k] for k in best[: self.count].tolist()]
 
 
 def match_descriptors(first: Features, second: Features, hamming: int) -> tuple[Indices, Indices]:
@@ -140,21 +143,77 @@ def match_near(
     points, features : ndarray (m,) of int
         Indices of the matches; every feature at most once.
     """
-    nothing = np.zeros(0, dtype=np.intp)
     if not len(expected) or not len(features):
-        return nothing, nothing
-    pairs = cKDTree(expected).sparse_distance_matrix(cKDTree(features.pixels), gate, output_type="ndarray")
-    point, feature = pairs["i"], pairs["j"]
-    mine = np.ascontiguousarray(descriptors).view(np.uint64)[point]
-    theirs = np.ascontiguousarray(features.descriptors).view(np.uint64)[feature]
-    bits = np.bitwise_count(mine ^ theirs).sum(axis=1, dtype=np.int32)
-    order = np.lexsort((bits, point))
-    point, feature, bits = point[order], feature[order], bits[order]
-    first = np.flatnonzero(np.diff(point, prepend=-1))
-    second = np.minimum(first + 1, len(point) - 1)
-    rival = np.where((second > first) & (point[second] == point[first]), bits[second], 256)
-    good = first[(bits[first] < hamming) & (bits[first] < ratio * rival)]
-    good = good[np.argsort(bits[good], kind="stable")]
-    _, unique = np.unique(feature[good], return_index=True)
-    good = good[unique]
-    return point[good], feature[good]
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+    point = _points_of_features(
+        np.ascontiguousarray(expected),
+        np.ascontiguousarray(descriptors).view(np.uint64),
+        np.ascontiguousarray(features.pixels),
+        np.ascontiguousarray(features.descriptors).view(np.uint64),
+        gate,
+        hamming,
+        ratio,
+    )
+    feature = np.flatnonzero(point >= 0)
+    return point[feature], feature
+
+
+@njit(cache=True)
+def _points_of_features(
+    expected: Array,
+    descriptors: NDArray[np.uint64],
+    pixels: Array,
+    seen: NDArray[np.uint64],
+    gate: float,
+    hamming: int,
+    ratio: float,
+) -> Indices:
+    """Return the point that each feature matches, or -1, for `match_near`; descriptors as (n, 4) words.
+
+    The features are sorted into cells as wide as the gate, so that a point looks into nine cells only.
+    """
+    corner_x, corner_y = pixels[:, 0].min(), pixels[:, 1].min()
+    columns = int((pixels[:, 0].max() - corner_x) / gate) + 1
+    rows = int((pixels[:, 1].max() - corner_y) / gate) + 1
+    column = ((pixels[:, 0] - corner_x) / gate).astype(np.intp)
+    row = ((pixels[:, 1] - corner_y) / gate).astype(np.intp)
+    order = np.argsort(row * columns + column, kind="mergesort")
+    start = np.zeros(rows * columns + 1, dtype=np.intp)
+    for feature in range(len(pixels)):
+        start[row[feature] * columns + column[feature] + 1] += 1
+    start = np.cumsum(start)
+
+    point_of = np.full(len(pixels), -1)
+    bits_of = np.full(len(pixels), 256)
+    for point in range(len(expected)):
+        x, y = expected[point]
+        middle_column, middle_row = math.floor((x - corner_x) / gate), math.floor((y - corner_y) / gate)
+        best, best_bits, rival_bits = -1, 256, 256
+        for r in range(max(middle_row - 1, 0), min(middle_row + 2, rows)):
+            for c in range(max(middle_column - 1, 0), min(middle_column + 2, columns)):
+                cell = r * columns + c
+                for feature in order[start[cell] : start[cell + 1]]:
+                    if (pixels[feature, 0] - x) ** 2 + (pixels[feature, 1] - y) ** 2 > gate**2:
+                        continue
+                    bits = _differing_bits(descriptors[point], seen[feature])
+                    if bits < best_bits:
+                        best, best_bits, rival_bits = feature, bits, best_bits
+                    elif bits < rival_bits:
+                        rival_bits = bits
+        if best_bits < hamming and best_bits < ratio * rival_bits and best_bits < bits_of[best]:
+            point_of[best], bits_of[best] = point, best_bits
+    return point_of
+
+
+@njit(cache=True)
+def _differing_bits(first: NDArray[np.uint64], second: NDArray[np.uint64]) -> int:
+    """Return the number of bits in which two rows of words differ, counted in ever wider fields."""
+    total = np.int64(0)
+    for k in range(len(first)):
+        word = first[k] ^ second[k]
+        word -= (word >> np.uint64(1)) & np.uint64(0x5555555555555555)
+        pairs = word & np.uint64(0x3333333333333333)
+        word = pairs + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
+        word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+        total += np.int64((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
+    return int(total)

@@ -319,13 +319,13 @@ class MonocularTracker:
     ) -> tuple[TrackedFrame, Indices]:
         """Solve perspective-n-point for the matches; also return the map point of every feature, or -1."""
         world, pixels = self.map.positions[points], features.pixels[matched]
-        pose, inliers = self._perspective(world, pixels, rounds)
+        pose, error = self._perspective(world, pixels, rounds)
+        inliers = np.flatnonzero(error < self.settings.inlier_error)
         owner = np.full(len(features), -1)
         counts = len(features), len(points), len(inliers)
         if pose is None or len(inliers) < fewest:
             return TrackedFrame(np.full((4, 4), np.nan), False, *counts, other_pixels=features.pixels), owner
         owner[matched[inliers]] = points[inliers]
-        error = self._reprojection(pose, world, pixels)
         frame = TrackedFrame(
             pose,
             True,
@@ -338,10 +338,14 @@ class MonocularTracker:
         )
         return frame, owner
 
-    def _perspective(self, world: Array, pixels: Array, rounds: int) -> tuple[Array | None, Indices]:
-        """Return the pose from points (n, 3) and pixels (n, 2) by RANSAC and refinement, and the inliers."""
+    def _perspective(self, world: Array, pixels: Array, rounds: int) -> tuple[Array | None, Array]:
+        """Return the pose from points (n, 3) and pixels (n, 2) by RANSAC and refinement, and the errors (n,).
+
+        Without six points that agree there is no pose.
+        """
+        error = np.full(len(world), np.inf)
         if len(world) < 6:
-            return None, np.zeros(0, dtype=np.intp)
+            return None, error
         found, rotation, translation, chosen = cv2.solvePnPRansac(
             world,
             pixels,
@@ -353,17 +357,18 @@ class MonocularTracker:
             flags=cv2.SOLVEPNP_EPNP,
         )
         if not found or chosen is None or len(chosen) < 6:
-            return None, np.zeros(0, dtype=np.intp)
+            return None, error
         inliers = chosen[:, 0].astype(np.intp)
         for _ in range(2):
             rotation, translation = cv2.solvePnPRefineLM(
                 world[inliers], pixels[inliers], self.camera.matrix, None, rotation, translation
             )
             pose = _camera_pose(cv2.Rodrigues(rotation)[0], translation)
-            inliers = np.flatnonzero(self._reprojection(pose, world, pixels) < self.settings.inlier_error)
+            error = self._reprojection(pose, world, pixels)
+            inliers = np.flatnonzero(error < self.settings.inlier_error)
             if len(inliers) < 6:
-                return None, inliers
-        return pose, inliers
+                return None, error
+        return pose, error
 
     def _reprojection(self, pose: Array, world: Array, pixels: Array) -> Array:
         """Return the distances (n,) between pixels (n, 2) and the projections of points (n, 3) [px]."""

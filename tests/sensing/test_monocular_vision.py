@@ -222,3 +222,32 @@ def test_matching_stays_in_the_gate_and_uses_a_feature_once():
     none = Features(np.zeros((0, 2)), np.zeros((0, 32), np.uint8))
     assert len(match_near(pixels, descriptors, none, 10.0, 60, 0.9)[0]) == 0
     assert len(match_descriptors(none, image, 60)[0]) == 0
+
+
+def matches_by_every_pair(expected, descriptors, image, gate, hamming, ratio):
+    """The readable reference of `match_near`: the bits of every point against every feature."""
+    apart = np.linalg.norm(expected[:, None] - image.pixels, axis=2)
+    bits = np.bitwise_count(descriptors[:, None] ^ image.descriptors).sum(axis=2, dtype=int)
+    bits[apart > gate] = 256
+    best, rival = np.sort(bits, axis=1)[:, :2].T
+    bits[(best >= hamming) | (best >= ratio * rival)] = 256
+    matched = [(point, row.argmin()) for point, row in enumerate(bits) if row.min() < 256]
+    of_feature = {}
+    for point, feature in sorted(matched, key=lambda pair: bits[pair]):
+        of_feature.setdefault(feature, point)
+    return [(of_feature[feature], feature) for feature in sorted(of_feature)]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(1.0, 500.0))
+def test_matching_in_cells_is_matching_of_every_pair(seed, gate):
+    """Few bits differ, so that rivals and ties are frequent; some points lie far outside of the features."""
+    rng = np.random.default_rng(seed)
+    words = rng.integers(0, 256, (6, 32), dtype=np.uint8)
+    features, points = rng.integers(2, 80), rng.integers(1, 80)
+    image = Features(rng.uniform(-20, 300, (features, 2)), words[rng.integers(0, 6, features)].copy())
+    image.descriptors[:, :4] ^= rng.integers(0, 256, (features, 4), dtype=np.uint8)
+    descriptors, expected = words[rng.integers(0, 6, points)], rng.uniform(-200, 500, (points, 2))
+    arguments = expected, descriptors, image, gate, 60, 0.9
+    pairs = list(zip(*(indices.tolist() for indices in match_near(*arguments))))
+    assert pairs == matches_by_every_pair(*arguments)
