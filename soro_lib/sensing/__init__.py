@@ -8,7 +8,8 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "fibre": ["FibreGratings"],
         "hand_tracking": ["HandSample", "hand_samples", "load_hand_recording"],
         "monocular_vision": ["MonocularTracker", "fit_similarity"],
-        "rendering": ["Camera", "Photometry", "Polygon", "Sphere", "TexturedQuad", "expose", "render"],
+        "rendering": ["Camera", "Photometry", "Polygon", "TexturedQuad", "expose", "render"],
+        "round_bodies": ["Sphere", "Tube"],
         "stereo_vision": ["triangulate"],
     },
 )

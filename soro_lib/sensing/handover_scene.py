@@ -26,16 +26,14 @@ from soro_lib.sensing.rendering import (
     Image,
     Photometry,
     Polygon,
-    Sphere,
     TexturedQuad,
+    invert_pose,
     look_at,
     motion_kernel,
     render,
     transform_points,
 )
-
-Color = tuple[int, int, int]
-"""Blue, green, red."""
+from soro_lib.sensing.round_bodies import Color, Sphere, Tube
 
 BRIO = Camera(
     1280, 720, focal_length=907.0, principal_point=(643.5, 356.5), distortion=(0.06, -0.10, 0.0, 0.0)
@@ -153,6 +151,11 @@ class MarkerRing:
         return poses
 
     @cached_property
+    def wrist_in_markers(self) -> NDArray[np.float64]:
+        """Return the inverse (sides, 4, 4) of every marker's pose."""
+        return np.array([invert_pose(pose) for pose in self.marker_poses])
+
+    @cached_property
     def marker_corners(self) -> NDArray[np.float64]:
         """Return the corners (sides, 4, 3) [m] in the wrist frame, in OpenCV's order: clockwise from top
         left."""
@@ -185,58 +188,6 @@ class MarkerRing:
     def _rectangles(self, width: float, height: float) -> NDArray[np.float64]:
         corners = np.array([(-1, 1, 0), (1, 1, 0), (1, -1, 0), (-1, -1, 0)]) * (width / 2, height / 2, 0)
         return np.array([transform_points(pose, corners) for pose in self.marker_poses])
-
-
-@dataclass(frozen=True, eq=False)
-class Tube:
-    """A round tube along a curve, shaded from left to right as seen from the camera.
-
-    Attributes
-    ----------
-    points : ndarray, shape (n, 3)
-        Centre line [m].
-    radius : float or ndarray, shape (n,)
-        Radius [m].
-    colors : sequence of (int, int, int)
-        Colours of the slices, in turn.
-    layer : int
-        See :class:`soro_lib.sensing.rendering.Drawable`.
-    """
-
-    points: NDArray[np.float64]
-    radius: float | NDArray[np.float64]
-    colors: Sequence[Color] = (TPU,)
-    layer: int = 0
-
-    @property
-    def middle(self) -> NDArray[np.float64]:
-        """Return the mean of the centre line (3,) [m]."""
-        return self.points.mean(axis=0)
-
-    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
-        """Paint the tube into ``image``, in place; nothing if it reaches beyond the camera's view cone."""
-        points = transform_points(world_in_camera, self.points)
-        across = np.cross(np.gradient(points, axis=0), points)
-        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
-        edges = (
-            points[:, None]
-            + np.multiply.outer(np.broadcast_to(self.radius, len(points)), STRIPS)[..., None]
-            * across[:, None]
-        )
-        if not camera.sees(edges.reshape(-1, 3)):
-            return
-        pixels = camera.project(edges).reshape(len(points), len(STRIPS), 2)
-        corners = np.round(16 * np.clip(pixels, -2000, 4000)).astype(np.int32)
-        for i in range(len(points) - 1):
-            color = self.colors[i % len(self.colors)]
-            for j, shade in enumerate(STRIP_SHADES):
-                quad = corners[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]]
-                cv2.fillConvexPoly(image, quad, [shade * c for c in color], cv2.LINE_AA, shift=4)
-
-
-STRIPS = np.array([-1.0, -0.62, -0.1, 0.45, 1.0])
-STRIP_SHADES = (0.62, 0.85, 1.0, 0.8)
-"""Edges and brightness of the strips across a tube."""
 
 
 @dataclass(frozen=True)
@@ -460,7 +411,7 @@ def photograph(
         row, column = rng.integers(NOISE_MARGIN, size=2)
         window = slice(row, row + height), slice(column, column + width)
         more, less = _sensor_noise(photometry.read_noise, height, width)
-        image = cv2.subtract(cv2.add(image, more[window]), less[window])  # type: ignore[assignment]
+        cv2.subtract(cv2.add(image, more[window], image), less[window], image)
     return np.asarray(image, dtype=np.uint8)
 
 

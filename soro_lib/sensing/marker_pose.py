@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from soro_lib.sensing.handover_scene import MarkerRing
-from soro_lib.sensing.rendering import invert_pose
 from soro_lib.sensing.stereo_vision import CalibratedCamera
 
 Markers = Mapping[int, NDArray[np.float64]]
@@ -67,13 +66,13 @@ def wrist_candidates(markers: Markers, camera: CalibratedCamera, ring: MarkerRin
     """Return ``wrist_in_world`` (m, 2, 4, 4) of both poses of every marker, the better reprojection first."""
     half = ring.marker / 2
     square = np.array([(-half, half, 0), (half, half, 0), (half, -half, 0), (-half, -half, 0)])
+    identity = np.eye(3)
     candidates = np.empty((len(markers), 2, 4, 4))
-    for row, (number, corners) in zip(candidates, markers.items()):
-        rays = np.ascontiguousarray(camera.camera.rays(corners)[:, :2])
+    for row, number, rays in zip(candidates, markers, _rays(markers, camera)):
         _, rotations, translations, _ = cv2.solvePnPGeneric(
-            square, rays, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE_SQUARE
+            square, rays, identity, None, flags=cv2.SOLVEPNP_IPPE_SQUARE
         )
-        wrist_in_marker = invert_pose(ring.marker_poses[number])
+        wrist_in_marker = ring.wrist_in_markers[number]
         for i in range(2):
             j = min(i, len(rotations) - 1)
             marker_in_camera = np.eye(4)
@@ -81,6 +80,12 @@ def wrist_candidates(markers: Markers, camera: CalibratedCamera, ring: MarkerRin
             marker_in_camera[:3, 3] = translations[j].ravel()
             row[i] = camera.pose @ marker_in_camera @ wrist_in_marker
     return candidates
+
+
+def _rays(markers: Markers, camera: CalibratedCamera) -> NDArray[np.float64]:
+    """Return x/z and y/z (m, 4, 2) of the corners of the markers in the camera frame."""
+    rays = camera.camera.rays(np.concatenate(list(markers.values())))[:, :2]
+    return np.ascontiguousarray(rays).reshape(-1, 4, 2)
 
 
 def average_pose(candidates: NDArray[np.float64]) -> WristPose:
@@ -181,12 +186,11 @@ def joint_pose(
         offsets = corners @ pose[:3, :3].T
         in_camera = np.einsum("nji,nj->ni", rotations, offsets + pose[:3, 3] - positions)
         depth = np.maximum(in_camera[:, 2:], 1e-3)
-        residual = scale[:, None] * (in_camera[:, :2] / depth - seen)
-        slopes = np.zeros((len(corners), 2, 3))
-        slopes[:, 0, 0] = slopes[:, 1, 1] = 1
-        slopes[:, :, 2] = -in_camera[:, :2] / depth
-        by_point = np.einsum("nij,nkj->nik", scale[:, None, None] * slopes / depth[..., None], rotations)
-        jacobian = np.concatenate([by_point, np.cross(offsets[:, None], by_point)], axis=-1).reshape(-1, 6)
+        rays = in_camera[:, :2] / depth
+        residual = scale * (rays - seen)
+        across, forward = rotations[:, :, :2].transpose(0, 2, 1), rotations[:, None, :, 2]
+        by_point = (scale / depth)[:, None] * across - (scale * rays / depth)[..., None] * forward
+        jacobian = np.concatenate([by_point, _cross(offsets[:, None], by_point)], axis=-1).reshape(-1, 6)
         norms = np.linalg.norm(residual, axis=1)
         weights = np.repeat(np.minimum(1, 2 * CORNER_DEVIATION / np.maximum(norms, 1e-9)), 2)
         normal = jacobian.T @ (weights[:, None] * jacobian)
@@ -216,17 +220,23 @@ def _all_corners(
     y/z) and the focal length."""
     columns: list[tuple[NDArray[np.float64], ...]] = []
     for camera, markers in sights:
-        for number, corners in markers.items():
+        for number, rays in zip(markers, _rays(markers, camera)):
             columns.append(
                 (
                     ring.marker_corners[number],
                     np.broadcast_to(camera.pose[:3, :3], (4, 3, 3)),
                     np.broadcast_to(camera.pose[:3, 3], (4, 3)),
-                    camera.camera.rays(corners)[:, :2],
-                    np.full(4, float(camera.camera.focal_length)),
+                    rays,
+                    np.full((4, 1), float(camera.camera.focal_length)),
                 )
             )
     return tuple(np.concatenate(column) for column in zip(*columns))
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the vector products (..., 3); np.cross spends most of its time on the order of its axes."""
+    ax, ay, az, bx, by, bz = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 def viewing_cosines(

@@ -7,7 +7,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,27 @@ class Look:
     balls: list[list[BallSight]]
     chosen: list[BallSight | None]
     complaints: list[str]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The markers that one camera sees, and where each alone puts the wrist.
+
+    Attributes
+    ----------
+    camera : CalibratedCamera
+    markers : dict
+        Corners (4, 2) [px] by id, one marker at least.
+    candidates : ndarray, shape (m, 2, 4, 4)
+        Of :func:`wrist_candidates`.
+    cosines : ndarray, shape (m, 2)
+        Of :func:`viewing_cosines`.
+    """
+
+    camera: CalibratedCamera
+    markers: dict[int, NDArray[np.float64]]
+    candidates: NDArray[np.float64]
+    cosines: NDArray[np.float64]
 
 
 @dataclass
@@ -148,10 +169,11 @@ class HandoverVision:
         usable = [image if not complaint else None for image, complaint in zip(images, complaints)]
         markers = [{} if image is None else self._markers(i, image) for i, image in enumerate(usable)]
         balls = [[] if image is None else self._balls(i, image) for i, image in enumerate(usable)]
-        pose = self.estimate(markers, self.estimator)
+        sights = self._sights(markers)
+        pose = self._pose(sights, self.estimator)
         ball, gap, chosen = self._ball(balls)
         trouble = "" if pose else "no marker seen"
-        apart = self._wrists_apart(markers)
+        apart = self._wrists_apart(sights)
         if apart > self.largest_disagreement:
             pose = ball = None
             trouble = f"the cameras put the wrist {1e3 * apart:.0f} mm apart: swapped or moved?"
@@ -179,20 +201,29 @@ class HandoverVision:
 
     def estimate(self, markers: Sequence[dict[int, NDArray[np.float64]]], estimator: str) -> WristPose | None:
         """Return the wrist that an estimator makes of the markers of each camera; None without markers."""
-        sights = [(camera, seen) for camera, seen in zip(self.cameras, markers) if seen]
+        return self._pose(self._sights(markers), estimator)
+
+    def _sights(self, markers: Sequence[dict[int, NDArray[np.float64]]]) -> list[Sight]:
+        """Return what the cameras make of their markers, of those that see any."""
+        sights = []
+        for camera, seen in zip(self.cameras, markers):
+            if seen:
+                candidates = wrist_candidates(seen, camera, self.ring)
+                cosines = viewing_cosines(candidates, seen, camera, self.ring)
+                sights.append(Sight(camera, seen, candidates, cosines))
+        return sights
+
+    def _pose(self, sights: Sequence[Sight], estimator: str) -> WristPose | None:
         if not sights:
             return None
-        candidates = [wrist_candidates(seen, camera, self.ring) for camera, seen in sights]
-        together = np.concatenate(candidates)
+        candidates = np.concatenate([sight.candidates for sight in sights])
         if estimator == "thesis":
-            return average_pose(together)
-        cosines = [
-            viewing_cosines(c, seen, camera, self.ring) for c, (camera, seen) in zip(candidates, sights)
-        ]
-        agreed = consensus_pose(together, np.concatenate(cosines), self.gripper_length, self._last_points)
+            return average_pose(candidates)
+        cosines = np.concatenate([sight.cosines for sight in sights])
+        agreed = consensus_pose(candidates, cosines, self.gripper_length, self._last_points)
         if estimator == "gated" or agreed.pose is None:
             return agreed
-        return joint_pose(agreed.pose, sights, self.ring)
+        return joint_pose(agreed.pose, [(sight.camera, sight.markers) for sight in sights], self.ring)
 
     def _complaint(self, index: int, image: Image | None) -> str:
         """Return why an image cannot be used, or ""."""
@@ -230,14 +261,11 @@ class HandoverVision:
         found = self.ball_detector.detect(image, window) if window else []
         return found or self.ball_detector.detect(image)
 
-    def _wrists_apart(self, markers: Sequence[dict[int, NDArray[np.float64]]]) -> float:
+    def _wrists_apart(self, sights: Sequence[Sight]) -> float:
         """Return how far apart the cameras put the wrist [m], of those that see two markers at least."""
-        wrists = []
-        for i, seen in enumerate(markers):
-            alone = self.estimate([seen if j == i else {} for j in range(len(markers))], "gated")
-            if alone is not None and len(seen) >= 2:
-                wrists.append(alone.wrist)
-        return max((float(np.linalg.norm(a - b)) for a in wrists for b in wrists), default=0.0)
+        alone = [self._pose([sight], "gated") for sight in sights if len(sight.markers) >= 2]
+        wrists = [pose.wrist for pose in alone if pose is not None]
+        return max((float(np.linalg.norm(a - b)) for a, b in combinations(wrists, 2)), default=0.0)
 
     def _ball(
         self, balls: Sequence[list[BallSight]]

@@ -1,21 +1,23 @@
-"""A pinhole camera and what it sees: textured quads, flat polygons and shaded spheres, drawn far to near.
+"""A pinhole camera and what it sees: textured quads and flat polygons, drawn far to near.
 
 The images are made for real detectors (ORB features, ArUco markers, colour contours), so geometry is exact
-to a fraction of a pixel and the photometry has the noise of a sensor. Nothing here knows a robot.
+to a fraction of a pixel and the photometry has the noise of a sensor. Nothing here knows a robot. Round
+things, whose outlines are compiled, are in :mod:`soro_lib.sensing.round_bodies`.
 
 Frames: the camera frame is OpenCV's, x right, y down, z forward. A pose is a (4, 4) homogeneous matrix named
 ``camera_in_world``: it takes points of the camera frame to the world. Pixel (0, 0) is the centre of the
 upper left pixel.
 
     camera = Camera(640, 480, focal_length=520.0)
-    image = render(camera, camera_in_world, [TexturedQuad(corners, texture), Sphere(centre, 0.02, 200)])
+    image = render(camera, camera_in_world, [TexturedQuad(corners, texture), Polygon(outline, 200)])
     image = expose(image, Photometry(gain=0.5), rng.standard_normal(image.shape, dtype=np.float32))
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
+from math import ceil, dist, floor
 from typing import Protocol
 
 import cv2
@@ -94,12 +96,18 @@ class Camera:
         return np.column_stack([flat, np.ones(len(flat))])
 
     @cached_property
+    def numbers(self) -> tuple[float, ...]:
+        """Return focal length, principal point [px] and k1, k2, p1, p2, k3, for compiled code."""
+        distortion = (*self.distortion, 0.0, 0.0, 0.0, 0.0, 0.0)[:5]
+        return tuple(map(float, (self.focal_length, *self.matrix[:2, 2], *distortion)))
+
+    @cached_property
     def reach(self) -> float:
         """Return the distance r / z from the optical axis up to which the radial distortion is monotonic.
 
         Beyond it the polynomial folds back and would show things that lie outside the field of view.
         """
-        k1, k2, _, _, k3 = (*self.distortion, 0.0, 0.0, 0.0, 0.0, 0.0)[:5]
+        k1, k2, _, _, k3 = self.numbers[3:]
         roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
         turns = roots.real[(abs(roots.imag) < 1e-12) & (roots.real > 0)]
         return float(np.sqrt(turns.min(initial=np.inf)))
@@ -109,13 +117,21 @@ class Camera:
 
         The view is widened by a whole image on every side, which leaves room for the distortion.
         """
+        normals, offsets = self._view
+        if (polygon @ normals.T >= offsets).all():
+            return polygon
+        for normal, offset in zip(normals, offsets):
+            polygon = clip_half_space(polygon, normal, offset)
+        return polygon
+
+    @cached_property
+    def _view(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return normals (5, 3) and offsets (5,) [m] of the half spaces of :meth:`clip`."""
         (f, _, cx), (_, _, cy) = self.matrix[:2]
         left, top = cx + self.width, cy + self.height
         right, bottom = 2 * self.width - cx, 2 * self.height - cy
-        polygon = clip_half_space(polygon, (0, 0, 1), NEAR)
-        for normal in ((f, 0, left), (-f, 0, right), (0, f, top), (0, -f, bottom)):
-            polygon = clip_half_space(polygon, normal, 0.0)
-        return polygon
+        normals = [(0, 0, 1), (f, 0, left), (-f, 0, right), (0, f, top), (0, -f, bottom)]
+        return np.array(normals), np.array([NEAR, 0, 0, 0, 0])
 
     def sees(self, points: NDArray[np.float64]) -> bool:
         """Return whether all points (n, 3) in the camera frame lie in front and within :attr:`reach`."""
@@ -177,13 +193,14 @@ class TexturedQuad:
             raise ValueError(
                 f"TexturedQuad.corners must be four finite points (4, 3), got shape {corners.shape}"
             )
-        if not np.allclose(corners[0] + corners[2], corners[1] + corners[3], atol=1e-6):
+        gap = corners[0] - corners[1] + corners[2] - corners[3]
+        if np.abs(gap).max() > 1e-6:
             raise ValueError("TexturedQuad.corners must form a parallelogram")
         if self.texture.dtype != np.uint8 or self.texture.ndim not in (2, 3):
             raise ValueError(f"TexturedQuad.texture must be a uint8 picture, got {self.texture.dtype}")
         object.__setattr__(self, "corners", corners)
 
-    @property
+    @cached_property
     def middle(self) -> NDArray[np.float64]:
         """Return the centre of the quad (3,) [m]."""
         return self.corners.mean(axis=0)
@@ -207,30 +224,29 @@ class TexturedQuad:
         """Paint the quad into ``image``, in place."""
         corners = transform_points(world_in_camera, self.corners)
         right, down = self._edges(corners)
-        if np.linalg.det(np.array([right, down, corners[0]])) <= 0:  # seen from behind
+        if _triple_product(right, down, corners[0]) <= 0:  # seen from behind
             return
         outline = camera.clip(corners)
         if len(outline) < 3 or (camera.distortion and not camera.sees(corners)):
             return
         pixels = camera.project(outline)
-        region = _region(pixels, image)
+        region = image_region(pixels, image)
         if region is None:
             return
         height, width = self.texture.shape[:2]
         if camera.distortion:
-            edges = np.array([(0, 0), (width, 0), (width, height), (0, height)]) - 0.5
-            corners_seen = camera.project(corners).astype(np.float32)
-            homography = cv2.getPerspectiveTransform(edges.astype(np.float32), corners_seen).astype(float)
+            edges = (np.array([(0, 0), (width, 0), (width, height), (0, height)]) - 0.5).astype(np.float32)
+            ends = (pixels if outline is corners else camera.project(corners)).astype(np.float32)
+            homography = cv2.getPerspectiveTransform(edges, ends).astype(float)
         else:
             per_texel = np.array([[1 / width, 0, 0.5 / width], [0, 1 / height, 0.5 / height], [0, 0, 1]])
             homography = camera.matrix @ np.column_stack([right, down, corners[0]]) @ per_texel
         homography, size = _into_region(homography, region, self.supersampling)
         patch = _image(cv2.warpPerspective(self.texture, homography, size, borderMode=cv2.BORDER_REPLICATE))
-        inside = np.full((height, width), 255, dtype=np.uint8)
-        mask = _image(cv2.warpPerspective(inside, homography, size, flags=cv2.INTER_NEAREST))
+        mask = _image(cv2.warpPerspective(_white(height, width), homography, size, flags=cv2.INTER_NEAREST))
         if outline is not corners:
             mask &= _polygon_mask(pixels, region, self.supersampling)
-        _paste(image, region, patch, mask)
+        paste(image, region, patch, mask)
 
     @staticmethod
     def _edges(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -255,7 +271,7 @@ class Polygon:
     color: int | tuple[int, int, int]
     layer: int = 0
 
-    @property
+    @cached_property
     def middle(self) -> NDArray[np.float64]:
         """Return the mean of the corners (3,) [m]."""
         return np.mean(self.corners, axis=0)
@@ -266,73 +282,8 @@ class Polygon:
         if len(outline) < 3 or (camera.distortion and not camera.sees(outline)):
             return
         pixels = camera.project(outline)
-        if _region(pixels, image) is not None:
+        if image_region(pixels, image) is not None:
             cv2.fillConvexPoly(image, _fixed_point(pixels), self.color, cv2.LINE_AA, shift=4)
-
-
-@dataclass(frozen=True, eq=False)
-class Sphere:
-    """A matt ball under one distant lamp; its outline and shading are exact for every pixel.
-
-    Parameters
-    ----------
-    centre : array (3,)
-        Centre [m] in the world.
-    radius : float
-        Radius [m].
-    color : int or (int, int, int)
-        Grey level, or blue, green, red of the fully lit surface, 0 to 255.
-    to_light : array (3,), optional
-        Direction in the world from the ball to the lamp.
-    ambient : float, optional
-        Brightness of the unlit side as a part of the lit one, 0 to 1.
-    layer, supersampling : int, optional
-        As for :class:`TexturedQuad`.
-    """
-
-    centre: NDArray[np.float64]
-    radius: float
-    color: int | tuple[int, int, int]
-    to_light: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    ambient: float = 1.0
-    layer: int = 0
-    supersampling: int = 3
-
-    @property
-    def middle(self) -> NDArray[np.float64]:
-        """Return the centre (3,) [m]."""
-        return np.asarray(self.centre, dtype=float)
-
-    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
-        """Paint the ball into ``image``, in place."""
-        centre = transform_points(world_in_camera, self.middle[None])[0]
-        silhouette = self._silhouette(centre)
-        if centre[2] < NEAR + self.radius or not camera.sees(silhouette):
-            return
-        region = _region(camera.project(silhouette), image)
-        if region is None:
-            return
-        rays = camera.rays(_pixel_grid(region, self.supersampling))
-        rays /= np.sqrt((rays**2).sum(axis=1))[:, None]
-        along = rays @ centre
-        discriminant = along**2 - (centre @ centre - self.radius**2)
-        hit = discriminant >= 0
-        normals = (rays * (along - np.sqrt(np.where(hit, discriminant, 0)))[:, None] - centre) / self.radius
-        light = world_in_camera[:3, :3] @ np.asarray(self.to_light, dtype=float)
-        lit = np.maximum(normals @ (light / np.linalg.norm(light)), 0)
-        brightness = self.ambient + (1 - self.ambient) * lit
-        rows, columns = (self.supersampling * (axis.stop - axis.start) for axis in region)
-        patch = np.clip(brightness[:, None] * np.atleast_1d(self.color), 0, 255).astype(np.uint8)
-        mask = np.where(hit, 255, 0).astype(np.uint8).reshape(rows, columns)
-        _paste(image, region, patch.reshape(rows, columns, *image.shape[2:]), mask)
-
-    def _silhouette(self, centre: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return points (32, 3) of the circle in which the cone of tangents touches the ball."""
-        shrink = 1 - self.radius**2 / (centre @ centre)
-        _, _, axes = np.linalg.svd(centre[None])
-        angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
-        circle = np.outer(np.cos(angles), axes[1]) + np.outer(np.sin(angles), axes[2])
-        return shrink * centre + np.sqrt(shrink) * self.radius * circle
 
 
 def render(
@@ -377,7 +328,7 @@ def render(
         image = np.full((camera.height, camera.width, *channels), background, dtype=np.uint8)
     position = camera_in_world[:3, 3]
     world_in_camera = invert_pose(camera_in_world)
-    for item in sorted(scene, key=lambda item: (item.layer, -np.linalg.norm(item.middle - position))):
+    for item in sorted(scene, key=lambda item: (item.layer, -dist(item.middle, position))):
         item.draw(image, camera, world_in_camera)
     return image
 
@@ -529,19 +480,32 @@ def clip_half_space(polygon: NDArray[np.float64], normal: ArrayLike, offset: flo
     return np.array(kept).reshape(-1, 3)
 
 
+def image_region(pixels: NDArray[np.float64], image: Image) -> Region | None:
+    """Return the rows and columns of the image that the pixels (n, 2) span, or None if they miss it."""
+    (left, top), (right, bottom) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
+    rows = slice(max(0, floor(top)), min(image.shape[0], ceil(bottom) + 1))
+    columns = slice(max(0, floor(left)), min(image.shape[1], ceil(right) + 1))
+    return (rows, columns) if rows.start < rows.stop and columns.start < columns.stop else None
+
+
+def paste(image: Image, region: Region, patch: Image, mask: Image) -> None:
+    """Put the supersampled patch into the region of the image where the mask says so, softly at its edges."""
+    target = image[region]
+    if mask.shape == target.shape[:2]:
+        cv2.copyTo(patch, mask, target)
+        return
+    size = target.shape[1::-1]
+    patch = _image(cv2.resize(patch, size, interpolation=cv2.INTER_AREA))
+    opacity = _image(cv2.resize(mask, size, interpolation=cv2.INTER_AREA))
+    if target.ndim == 3:
+        opacity = _image(cv2.merge([opacity, opacity, opacity]))
+    weight = opacity / np.float32(255)
+    target[...] = np.round(weight * patch + (1 - weight) * target)
+
+
 def _image(picture: object) -> Image:
     """Return what an OpenCV function made as the 8-bit image it is (OpenCV's own types are wider)."""
     return np.asarray(picture, dtype=np.uint8)
-
-
-def _region(pixels: NDArray[np.float64], image: Image) -> Region | None:
-    """Return the rows and columns of the image that the pixels (n, 2) span, or None if they miss it."""
-    size = np.array(image.shape[1::-1])
-    low = np.clip(np.floor(pixels.min(axis=0)), 0, size).astype(int)
-    high = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, size).astype(int)
-    if (high <= low).any():
-        return None
-    return slice(low[1], high[1]), slice(low[0], high[0])
 
 
 def _into_region(
@@ -561,15 +525,6 @@ def _into_region(
     return shift @ homography, size
 
 
-def _pixel_grid(region: Region, supersampling: int) -> NDArray[np.float64]:
-    """Return the image coordinates (n, 2) of all samples of the region, row by row."""
-    y, x = (
-        (np.arange(supersampling * axis.start, supersampling * axis.stop) + 0.5) / supersampling - 0.5
-        for axis in region
-    )
-    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-
-
 def _polygon_mask(pixels: NDArray[np.float64], region: Region, supersampling: int) -> Image:
     """Return a mask of the supersampled region, 255 inside the convex polygon of pixels (n, 2)."""
     shift, (width, height) = _into_region(np.eye(3), region, supersampling)
@@ -584,14 +539,13 @@ def _fixed_point(pixels: NDArray[np.float64]) -> NDArray[np.int32]:
     return np.round(np.clip(pixels, -1e6, 1e6) * 16).astype(np.int32)
 
 
-def _paste(image: Image, region: Region, patch: Image, mask: Image) -> None:
-    """Put the supersampled patch into the region of the image where the mask says so, softly at its edges."""
-    target = image[region]
-    if mask.shape == target.shape[:2]:
-        cv2.copyTo(patch, mask, target)
-        return
-    size = target.shape[1::-1]
-    patch = _image(cv2.resize(patch, size, interpolation=cv2.INTER_AREA))
-    weight = cv2.resize(mask, size, interpolation=cv2.INTER_AREA).astype(np.float32) / 255
-    weight = weight.reshape(weight.shape + (1,) * (target.ndim - 2))
-    target[...] = np.round(weight * patch + (1 - weight) * target)
+@lru_cache(maxsize=64)
+def _white(height: int, width: int) -> Image:
+    """Return a white picture, what a quad's mask is made of."""
+    return np.full((height, width), 255, dtype=np.uint8)
+
+
+def _triple_product(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> float:
+    """Return the determinant of three vectors (3,), on single numbers, which are quicker than arrays."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = a.tolist(), b.tolist(), c.tolist()
+    return float((ay * bz - az * by) * cx + (az * bx - ax * bz) * cy + (ax * by - ay * bx) * cz)

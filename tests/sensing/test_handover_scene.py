@@ -16,7 +16,6 @@ from soro_lib.sensing.handover_scene import (
     Extras,
     HandoverScene,
     MarkerRing,
-    Tube,
     photograph,
     stereo_pair,
 )
@@ -170,14 +169,3 @@ def test_any_arm_and_ball_can_be_drawn(bends, y, z):
     items = scene.items(state.ravel(), [0.1, y, z])
     image = render(BRIO, STEREO[1].pose, items, background=(160, 160, 160))
     assert image.shape == (720, 1280, 3)
-
-
-def test_a_tube_has_the_width_of_a_cylinder():
-    view = STEREO[0]
-    middle = transform_points(view.pose, [[0.0, 0.0, 0.6]])[0]
-    tube = Tube(middle + np.outer([-0.05, 0.0, 0.05], [0, 0, 1.0]), 0.03, ((0, 0, 0),))
-    image = render(
-        replace(BRIO, distortion=(), principal_point=None), view.pose, [tube], background=(255,) * 3
-    )
-    width = (image[360, :, 0] < 128).sum()
-    assert width == pytest.approx(2 * 0.03 * 907 / 0.6, rel=0.02)
