@@ -126,6 +126,7 @@ def follow_curve(
     camera: CameraModel | None = None,
     wall: Wall | None = None,
     cycles: int = 3,
+    targets: int = TARGETS,
 ) -> CurveRun:
     """Follow the curve with the fused pose as feedback: model-based, then hybrid, then with an obstacle.
 
@@ -143,6 +144,8 @@ def follow_curve(
         A rod beside the arm.
     cycles : int
         1 to 3 cycles.
+    targets : int
+        Points of a cycle; fewer make the arm hurry.
     """
     camera = camera or CameraModel()
     arm, chambers = PneumaticArm(), load_plant("pentagram").chambers
@@ -151,9 +154,9 @@ def follow_curve(
     controller = HybridController(arm, HybridSettings(proportional_gain=gain))
     estimator = VisualStrainEstimator(ExtremeLearningMachine(rng), VisualStrainSettings())
     fibre = glue_fibre(rng)
-    steps = APPROACH + cycles * TARGETS
-    targets = octopus()[np.arange(-APPROACH, cycles * TARGETS).clip(0) % TARGETS]
-    cycle = 1 + np.maximum(np.arange(steps) - APPROACH, 0) // TARGETS
+    steps = APPROACH + cycles * targets
+    target = octopus(targets)[np.arange(-APPROACH, cycles * targets).clip(0) % targets]
+    cycle = 1 + np.maximum(np.arange(steps) - APPROACH, 0) // targets
     tips, feedback, lost = np.empty((steps, 2)), np.empty((steps, 2)), np.zeros(steps, dtype=bool)
     for step in range(steps):
         configuration = plant.configuration
@@ -166,12 +169,10 @@ def follow_curve(
         shift = fibre.shift(configuration, plant.lengths - arm.home, rng)
         estimate = estimator.update(PERIOD * step, shift, None if lost[step] else seen, 1.0, 300.0)
         known = plant.motors if mapping is None else mapping.chamber_lengths(plant.motors)
-        result = controller.update(
-            estimate.pose[:2], targets[step], known, compensating=bool(cycle[step] > 1)
-        )
+        result = controller.update(estimate.pose[:2], target[step], known, compensating=bool(cycle[step] > 1))
         plant.drive(result.actuation if mapping is None else mapping.motor_lengths(result.actuation))
         tips[step], feedback[step] = pose[:2], estimate.pose[:2]
-    return CurveRun(tips, feedback, targets, cycle, lost)
+    return CurveRun(tips, feedback, target, cycle, lost)
 
 
 def summarise_curve(run: CurveRun) -> pd.DataFrame:

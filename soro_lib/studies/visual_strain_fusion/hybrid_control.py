@@ -76,6 +76,7 @@ def compare_controllers(
     maximum_step: float = 3e-3,
     spread: float = 0.0,
     noise: float = SENSOR_NOISE,
+    steps: int | None = None,
 ) -> Comparison:
     """Run the model-based controller and every reading of the compensator on one path, for all four gains.
 
@@ -99,9 +100,11 @@ def compare_controllers(
         Spread of the plant parameters from seed to seed, as a standard deviation of logarithms [-].
     noise : float
         Standard deviation of the position sensor per axis [m].
+    steps : int, optional
+        Points of a cycle, as in `path_points`.
     """
     plant = plant or load_plant(path)
-    points = path_points(path, plant.rotation)
+    points = path_points(path, plant.rotation, steps)
     targets = np.tile(points, (cycles, 1))
     batch = (seeds, len(GAINS))
     base = HybridSettings(proportional_gain=np.array(GAINS), maximum_step=maximum_step, compensation="none")

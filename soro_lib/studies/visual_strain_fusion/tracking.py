@@ -23,7 +23,7 @@ SENSOR_NOISE = 1e-4
 """Standard deviation of the electromagnetic tracker per axis [m] (not printed in the paper)."""
 
 
-def path_points(path: str, rotation: float = 0.0) -> Array:
+def path_points(path: str, rotation: float = 0.0, steps: int | None = None) -> Array:
     """One cycle of target points of the "pentagram" or "circle", ``(steps, 2)`` [m].
 
     Parameters
@@ -32,8 +32,10 @@ def path_points(path: str, rotation: float = 0.0) -> Array:
         Name of the path.
     rotation : float
         Turn of the path about the arm, counter-clockwise [rad].
+    steps : int, optional
+        Points of the cycle; by default those of `STEPS_PER_CYCLE`.
     """
-    steps = STEPS_PER_CYCLE[path]
+    steps = steps or STEPS_PER_CYCLE[path]
     curve = {"pentagram": paths.pentagram, "circle": paths.circle}[path]
     return turn(curve(np.arange(steps) / steps, RADIUS), rotation)
 
