@@ -151,7 +151,7 @@ def test_printed_assistance_and_error_need_the_norm_and_the_index():
 @pytest.mark.parametrize("options", [{"jobs": 2}, {"chunk": 7}, {"chunk": 1000, "jobs": 2}])
 def test_numbers_do_not_depend_on_threads_or_chunks(options):
     plans = list(demonstration_plans(1, seed=4, trials=2))
-    pd.testing.assert_frame_equal(simulate(plans), simulate(plans, **options))
+    pd.testing.assert_frame_equal(simulate(plans), simulate(plans, **options), check_exact=True)
 
 
 def test_the_first_people_are_the_same_however_many_there_are():
@@ -183,8 +183,8 @@ def test_a_dead_worker_changes_nothing():
         together = simulate(plans, scheduler=client, chunk=4)
         assert killed.is_set(), "the sweep ended before the worker was killed"
         again = simulate(plans[:20], scheduler=cluster.scheduler_address, chunk=4)
-    pd.testing.assert_frame_equal(alone, together)
-    pd.testing.assert_frame_equal(again, alone.iloc[:20])
+    pd.testing.assert_frame_equal(alone, together, check_exact=True)
+    pd.testing.assert_frame_equal(again, alone.iloc[:20], check_exact=True, check_categorical=False)
 
 
 # --- The task for a hand from outside and bad input -------------------------------------------------

@@ -7,10 +7,12 @@ Source: Stroppa et al., Section 5.4.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.operators import ATTITUDES, POPULATIONS, Operator
@@ -96,22 +98,27 @@ def demonstration_plans(
 
 
 def run_demonstrations(
-    operators: int, seed: int, jobs: int = 1, scheduler: Any = None, **options: Any
+    operators: int,
+    seed: int,
+    jobs: int = 1,
+    scheduler: Any = None,
+    store: str | Path | None = None,
+    **options: Any,
 ) -> pd.DataFrame:
-    """Simulate the demonstrations; one line per trial. Options as in `demonstration_plans`."""
-    return simulate(demonstration_plans(operators, seed, **options), jobs=jobs, scheduler=scheduler)
+    """Simulate the demonstrations; one line per trial. Options as in `demonstration_plans` and `simulate`."""
+    plans = demonstration_plans(operators, seed, **options)
+    return simulate(plans, jobs=jobs, scheduler=scheduler, store=store)
 
 
 GUIDED = ("assist_as_needed", "fixed_assistance")
 """Paradigms that the force law and the attitude to the force concern."""
 
 
-def run_conditions(
-    operators: int, seed: int, trials: int = 2, jobs: int = 1, scheduler: Any = None
-) -> pd.DataFrame:
+def run_conditions(operators: int, seed: int, trials: int = 2, **run: Any) -> pd.DataFrame:
     """The demonstrations under every attitude, force law, and way to approach.
 
     The paradigms without a force are simulated once for each approach and serve every attitude and law.
+    ``run``: jobs, scheduler or store of `simulate`.
 
     Returns
     -------
@@ -134,7 +141,7 @@ def run_conditions(
                 ):
                     yield replace(plan, labels={**condition, **plan.labels})
 
-    table = simulate(plans(), jobs=jobs, scheduler=scheduler)
+    table = simulate(plans(), **run)
     unforced = table[table["attitude"] == "any"]
     copies = [
         unforced.assign(attitude=attitude, law=law)
@@ -192,14 +199,33 @@ def effects(
     return _over_people(others - aligned, resamples, seed)
 
 
+LARGEST_DRAW = 250_000
+"""Numbers that are drawn at a time; they take 2 MB, and as much again for their mean."""
+
+
+def resampled_means(
+    values: NDArray[np.float64], resamples: int, rng: np.random.Generator, largest: int = LARGEST_DRAW
+) -> NDArray[np.float64]:
+    """Means of bootstrap samples, NaN left out: (people, metrics) to (resamples, metrics).
+
+    At most ``largest`` numbers (of at least one sample) are drawn at a time; the means do not depend on it.
+    """
+    means = np.empty((resamples, values.shape[1]))
+    step = max(1, largest // values.size)
+    for first in range(0, resamples, step):
+        part = means[first : first + step]
+        picks = rng.integers(len(values), size=(len(part), len(values)))
+        part[:] = np.nanmean(values[picks], axis=1)
+    return means
+
+
 def _over_people(people: pd.DataFrame, resamples: int, seed: int) -> pd.DataFrame:
     """Mean and bootstrap interval over the operators of every cell."""
     rng = np.random.default_rng(seed)
     rows = []
     for cell, group in people.groupby(CELLS, sort=False):
         values = group.to_numpy()
-        picks = rng.integers(len(values), size=(resamples, len(values)))
-        low, high = np.nanpercentile(np.nanmean(values[picks], axis=1), [2.5, 97.5], axis=0)
+        low, high = np.nanpercentile(resampled_means(values, resamples, rng), [2.5, 97.5], axis=0)
         for index, metric in enumerate(group.columns):
             row = {**dict(zip(CELLS, cell, strict=True)), "metric": metric}
             rows.append({**row, "mean": np.nanmean(values[:, index]), "low": low[index], "high": high[index]})

@@ -9,6 +9,7 @@ Source: Stroppa et al., Section 5.3 and Table 2.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations, product
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -107,6 +108,7 @@ def run_factorial(
     reading: DeltaReading = "seconds",
     jobs: int = 1,
     scheduler: Any = None,
+    store: str | Path | None = None,
     **settings: Any,
 ) -> pd.DataFrame:
     """Simulate the tuning study; one line per trial with the levels (0 low, 1 high) and the metrics.
@@ -114,7 +116,7 @@ def run_factorial(
     Parameters as in `factorial_plans` and `simulate`.
     """
     plans = factorial_plans(operators, seed, repetitions, reading, **settings)
-    return simulate(plans, jobs=jobs, scheduler=scheduler, chunk=96)
+    return simulate(plans, jobs=jobs, scheduler=scheduler, chunk=96, store=store)
 
 
 # --- Analysis of one operator's study ------------------------------------------------------------

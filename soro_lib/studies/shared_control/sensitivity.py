@@ -81,7 +81,7 @@ def sensitivity(count: int, seed: int, trials: int = 2, **run: Any) -> tuple[pd.
     trials : int
         Of each operator under each paradigm.
     **run
-        jobs or scheduler of `simulate`.
+        jobs, scheduler or store of `simulate`.
 
     Returns
     -------

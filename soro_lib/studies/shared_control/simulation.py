@@ -5,10 +5,12 @@ random stream of its own, so that the numbers depend neither on the other trials
 machines.
 """
 
+from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import joblib
@@ -25,6 +27,7 @@ from soro_lib.operators import EXPERT, Operator
 from soro_lib.operators.hand import hand_command
 from soro_lib.operators.loop import OperatorState, View, operator_start, operator_step, picture_buffer
 from soro_lib.robots.soft_growing_plant import NOTHING, SAMPLE_TIME
+from soro_lib.studies.shared_control.finished_chunks import chunk_path, read_chunk, write_chunk
 from soro_lib.studies.shared_control.task import (
     TaskMemory,
     TaskRule,
@@ -78,7 +81,7 @@ class TrialPlan:
     seed : tuple of int
         Entropy of the trial's random stream. Trials that share it meet the same chance.
     labels : mapping
-        Columns that identify the trial in the table.
+        Columns that identify the trial in the table; every trial of a sweep has the same.
     """
 
     settings: TaskSettings
@@ -210,6 +213,7 @@ def simulate(
     jobs: int = 1,
     scheduler: Any = None,
     chunk: int = CHUNK,
+    store: str | Path | None = None,
 ) -> pd.DataFrame:
     """Simulate trials and return one line each: their labels, then `METRICS`.
 
@@ -226,10 +230,14 @@ def simulate(
         worker had under way is run again elsewhere. The numbers are the same.
     chunk : int
         Trials per task.
+    store : str or Path, optional
+        Folder that keeps the finished chunks. A sweep that was killed goes on from them; trials of other
+        plans, or of other code, are not taken for them. It may be deleted at any time.
 
     Returns
     -------
     pandas.DataFrame
+        Labels that are text come as categories; 100 bytes a trial or so in all.
 
     Raises
     ------
@@ -240,23 +248,54 @@ def simulate(
         raise ValueError(f"time_limit must be above 0, got {time_limit!r}")
     if chunk < 1:
         raise ValueError(f"chunk must be at least 1, got {chunk!r}")
-    labels: list[Mapping[str, Any]] = []
-    pieces = _chunks(plans, chunk, labels)
+    labels: dict[str, list[Any]] = {}
+    places: list[Path | None] = []
+    metrics = array("d")
+
+    def tasks() -> Iterator[Any]:
+        for piece in _chunks(plans, chunk):
+            for name in piece[0].labels:
+                labels.setdefault(name, []).extend(plan.labels[name] for plan in piece)
+            place = None if store is None else _place(store, piece, time_limit)
+            table = None if place is None else read_chunk(place)
+            places.append(place if table is None else None)
+            yield joblib.delayed(simulate_chunk)(piece, time_limit) if table is None else _finished(table)
+
     with _backend(scheduler):
-        parallel = joblib.Parallel(n_jobs=-1 if scheduler is not None else jobs)
-        tables = parallel(joblib.delayed(simulate_chunk)(piece, time_limit) for piece in pieces)
-    metrics = np.concatenate(tables) if tables else np.empty((0, len(METRICS)))
-    return pd.concat([pd.DataFrame(labels), pd.DataFrame(metrics, columns=list(METRICS))], axis=1)
+        parallel = joblib.Parallel(n_jobs=-1 if scheduler is not None else jobs, return_as="generator")
+        for number, table in enumerate(parallel(tasks())):
+            if (place := places[number]) is not None:
+                write_chunk(place, table)
+            metrics.frombytes(table.tobytes())
+    columns = {name: _column(labels.pop(name)) for name in list(labels)}
+    values = np.frombuffer(metrics).reshape(-1, len(METRICS))
+    return pd.concat([pd.DataFrame(columns), pd.DataFrame(values, columns=list(METRICS), copy=False)], axis=1)
 
 
-def _chunks(
-    plans: Iterable[TrialPlan], size: int, labels: list[Mapping[str, Any]]
-) -> Iterator[list[TrialPlan]]:
-    """Cut the plans into lists; their labels are kept in passing."""
+def _chunks(plans: Iterable[TrialPlan], size: int) -> Iterator[list[TrialPlan]]:
+    """Cut the plans into lists."""
     remaining = iter(plans)
     while piece := list(islice(remaining, size)):
-        labels.extend(plan.labels for plan in piece)
         yield piece
+
+
+def _place(store: str | Path, piece: Sequence[TrialPlan], time_limit: float) -> Path:
+    """File of a chunk; labels do not enter, they only name the numbers."""
+    return chunk_path(store, (time_limit, *((plan.settings, plan.operator, plan.seed) for plan in piece)))
+
+
+def _finished(table: NDArray[np.float64]) -> Any:
+    """A task that hands on a chunk of an earlier run, so that the chunks stay in order."""
+    return joblib.delayed(np.asarray)(table)
+
+
+def _column(values: list[Any]) -> Any:
+    """A column of labels; text as categories, a byte each."""
+    if not isinstance(values[0], str):
+        return values
+    names = sorted(set(values))
+    codes = {name: code for code, name in enumerate(names)}
+    return pd.Categorical.from_codes([codes[value] for value in values], pd.Index(names))
 
 
 @contextmanager

@@ -51,7 +51,7 @@ def blend_surface(
         Shares of the machine to combine, in [0, 1].
     kinds : sequence of str
     **run
-        jobs or scheduler of `simulate`.
+        jobs, scheduler or store of `simulate`.
 
     Returns
     -------
