@@ -1,6 +1,9 @@
 """One thread per test, no user settings of matplotlib: what the runner also gives its notebooks."""
 
+import copy
 import os
+from dataclasses import dataclass
+from typing import Any
 
 import pytest
 from hypothesis import is_hypothesis_test, settings
@@ -29,3 +32,38 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             test._hypothesis_internal_use_settings = settings(
                 own, max_examples=SOAK_FACTOR * own.max_examples
             )
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The camera after its sweep before the flight `scene1_light`, as recorded.
+
+    ``before`` and ``after`` are the states of the random numbers.
+    """
+
+    scene: Any
+    tracker: Any
+    similarity: Any
+    before: dict[str, Any]
+    after: dict[str, Any]
+
+    def copy(self) -> Any:
+        """Return a tracker to fly on with; only the feature detector, which has no state, is shared."""
+        detector = self.tracker._detector
+        return copy.deepcopy(self.tracker, {id(detector): detector})
+
+
+@pytest.fixture(scope="session")
+def sweep() -> Sweep:
+    """Sweep once for all tests that fly: the sweep takes longer than all that they do with it."""
+    import numpy as np
+
+    from soro_lib.sensing.monocular_scene import BrickScene
+    from soro_lib.studies.visual_strain_fusion.camera_runs import FLIGHTS, start_tracker
+    from soro_lib.studies.visual_strain_fusion.record import SEED
+
+    flight = FLIGHTS["scene1_light"]
+    rng = np.random.default_rng([SEED, *flight.disturbance.encode()])
+    scene, before = BrickScene(flight.scene), rng.bit_generator.state
+    tracker, similarity = start_tracker(scene, rng)
+    return Sweep(scene, tracker, similarity, before, rng.bit_generator.state)

@@ -6,8 +6,8 @@ disturbances act on the pixels: a hand, a cover, fading light, a lamp that shine
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -22,11 +22,13 @@ ENDOSCOPE = Camera(640, 480, focal_length=520.0)
 TEXELS_PER_METRE = 5000.0
 """Resolution of the printed bricks; one texel is about one pixel at 10 cm."""
 
+STUD = 40
+"""Pitch of the studs on a brick [texels], which is 8 mm; a brick is two studs deep."""
+
 FLOOR = 0.130
 WALL = 0.165
 CEILING = -0.150
-STUD = 0.008
-"""Depth of the floor, distance of the walls, top of the walls, pitch of the studs on a brick [m]."""
+"""Depth of the floor, distance of the walls, top of the walls [m]."""
 
 PALM = 0.56
 """Half length of the palm as a part of the image's height: on the first scene it was raised from 0.42 until
@@ -94,109 +96,120 @@ class BrickScene:
     seed: int
     color: bool = False
 
-    @cached_property
-    def quads(self) -> list[TexturedQuad]:
-        """Return all printed surfaces."""
-        rng = np.random.default_rng(self.seed)
-        quads = [
-            self._surface(rng, (-WALL, -WALL, FLOOR), (2 * WALL, 0, 0), (0, 2 * WALL, 0), layer=-2),
-            *self._sides((-WALL, -WALL, CEILING), (2 * WALL, 2 * WALL, FLOOR - CEILING), rng, inward=True),
-        ]
-        for row in range(3):
-            for column in range(3):
-                quads += self._box(rng, np.array([column - 1.0, row - 1.0]) * 0.075)
-        return quads
+    @property
+    def quads(self) -> tuple[TexturedQuad, ...]:
+        """Return all printed surfaces, which are made once in a process."""
+        return printed_surfaces(self.seed, self.color)
 
     def image(self, camera_in_world: ArrayLike, camera: Camera = ENDOSCOPE) -> Image:
         """Return the noise-free, undisturbed view (height, width[, 3]) from a (4, 4) camera pose."""
         return render(camera, camera_in_world, self.quads, background=(0, 0, 0) if self.color else 0)
 
-    def _box(self, rng: np.random.Generator, middle: NDArray[np.float64]) -> list[TexturedQuad]:
-        """Return top and sides of a box standing near ``middle`` (2,) [m] on the floor."""
-        width, depth = rng.uniform(0.024, 0.046, 2)
-        height = rng.uniform(0.018, 0.052)
-        x, y = middle + rng.uniform(-0.014, 0.014, 2) - np.array([width, depth]) / 2
-        corner = (x, y, FLOOR - height)
-        top = self._surface(rng, corner, (width, 0, 0), (0, depth, 0))
-        return [top, *self._sides(corner, (width, depth, height), rng)]
 
-    def _sides(
-        self,
-        corner: tuple[float, float, float],
-        size: tuple[float, float, float],
-        rng: np.random.Generator,
-        inward: bool = False,
-    ) -> list[TexturedQuad]:
-        """Return the four upright faces of a block, seen from outside or, for the room, from inside."""
-        (x, y, z), (width, depth, height) = corner, size
-        starts = ((x, y), (x + width, y), (x + width, y + depth), (x, y + depth))
-        along = ((width, 0), (0, depth), (-width, 0), (0, -depth))
-        faces = []
-        for (start_x, start_y), (right_x, right_y) in zip(starts, along):
-            if not inward:
-                start_x, start_y = start_x + right_x, start_y + right_y
-                right_x, right_y = -right_x, -right_y
-            faces.append(
-                self._surface(
-                    rng, (start_x, start_y, z), (right_x, right_y, 0), (0, 0, height), -1 if inward else 0
-                )
-            )
-        return faces
+@lru_cache(maxsize=4)
+def printed_surfaces(seed: int, color: bool) -> tuple[TexturedQuad, ...]:
+    """Return floor, walls and boxes of a scene, see :class:`BrickScene`."""
+    rng = np.random.default_rng(seed)
+    size = 2 * WALL, 2 * WALL, FLOOR - CEILING
+    surfaces = [
+        _surface(rng, (-WALL, -WALL, FLOOR), (size[0], 0, 0), (0, size[1], 0), layer=-2),
+        *_sides((-WALL, -WALL, CEILING), size, rng, inward=True),
+    ]
+    for row in range(3):
+        for column in range(3):
+            surfaces += _box(rng, np.array([column - 1.0, row - 1.0]) * 0.075)
+    return tuple(surfaces if color else map(_in_grey, surfaces))
 
-    def _surface(
-        self,
-        rng: np.random.Generator,
-        corner: tuple[float, float, float],
-        right: tuple[float, float, float],
-        down: tuple[float, float, float],
-        layer: int = 0,
-    ) -> TexturedQuad:
-        """Return a freshly printed surface."""
-        corners = np.array(corner) + np.array([(0, 0, 0), right, np.add(right, down), down])
-        texture = brick_texture(rng, float(np.linalg.norm(right)), float(np.linalg.norm(down)))
-        if not self.color:
-            texture = np.asarray(cv2.cvtColor(texture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        return TexturedQuad(corners, texture, layer)
+
+def _in_grey(surface: TexturedQuad) -> TexturedQuad:
+    grey = np.asarray(cv2.cvtColor(surface.texture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+    return replace(surface, texture=grey)
+
+
+def _box(rng: np.random.Generator, middle: NDArray[np.float64]) -> list[TexturedQuad]:
+    """Return top and sides of a box standing near ``middle`` (2,) [m] on the floor."""
+    width, depth = rng.uniform(0.024, 0.046, 2)
+    height = rng.uniform(0.018, 0.052)
+    x, y = middle + rng.uniform(-0.014, 0.014, 2) - np.array([width, depth]) / 2
+    corner = (x, y, FLOOR - height)
+    top = _surface(rng, corner, (width, 0, 0), (0, depth, 0))
+    return [top, *_sides(corner, (width, depth, height), rng)]
+
+
+def _sides(
+    corner: tuple[float, float, float],
+    size: tuple[float, float, float],
+    rng: np.random.Generator,
+    inward: bool = False,
+) -> list[TexturedQuad]:
+    """Return the four upright faces of a block, seen from outside or, for the room, from inside."""
+    (x, y, z), (width, depth, height) = corner, size
+    starts = ((x, y), (x + width, y), (x + width, y + depth), (x, y + depth))
+    along = ((width, 0), (0, depth), (-width, 0), (0, -depth))
+    faces = []
+    for (start_x, start_y), (right_x, right_y) in zip(starts, along):
+        if not inward:
+            start_x, start_y = start_x + right_x, start_y + right_y
+            right_x, right_y = -right_x, -right_y
+        faces.append(
+            _surface(rng, (start_x, start_y, z), (right_x, right_y, 0), (0, 0, height), -1 if inward else 0)
+        )
+    return faces
+
+
+def _surface(
+    rng: np.random.Generator,
+    corner: tuple[float, float, float],
+    right: tuple[float, float, float],
+    down: tuple[float, float, float],
+    layer: int = 0,
+) -> TexturedQuad:
+    """Return a freshly printed surface."""
+    corners = np.array(corner) + np.array([(0, 0, 0), right, np.add(right, down), down])
+    texture = brick_texture(rng, float(np.linalg.norm(right)), float(np.linalg.norm(down)))
+    return TexturedQuad(corners, texture, layer)
 
 
 def brick_texture(rng: np.random.Generator, width: float, height: float) -> Image:
     """Return the print of bricks with studs and marks, (h, w, 3) uint8, for a surface of a size in metres."""
-    texels = round(TEXELS_PER_METRE * width), round(TEXELS_PER_METRE * height)
-    stud = TEXELS_PER_METRE * STUD
-    texture = np.zeros((texels[1], texels[0], 3), dtype=np.uint8)
-    for top in np.arange(0, texels[1], 2 * stud):
-        left = -stud * rng.integers(0, 4)
-        while left < texels[0]:
+    columns, rows = round(TEXELS_PER_METRE * width), round(TEXELS_PER_METRE * height)
+    texture = np.zeros((rows, columns, 3), dtype=np.uint8)
+    for top in range(0, rows, 2 * STUD):
+        left = -STUD * int(rng.integers(0, 4))
+        while left < columns:
             studs = int(rng.integers(2, 6))
             color = np.array(PALETTE[rng.integers(len(PALETTE))]) * rng.uniform(0.75, 1.1)
             _print_brick(rng, texture, (left, top), studs, color)
-            left += studs * stud
-    grain = rng.normal(0.0, 6.0, texture.shape[:2])[..., None]
-    return np.clip(texture + grain, 0, 255).astype(np.uint8)
+            left += studs * STUD
+    # Down to whole grey levels: what a sum in floating point would be cut to.
+    grain = np.floor(rng.normal(0.0, 6.0, (rows, columns))).astype(np.int16)
+    return np.asarray(cv2.add(texture, cv2.merge([grain, grain, grain]), dtype=cv2.CV_8U), dtype=np.uint8)
 
 
 def _print_brick(
     rng: np.random.Generator,
     texture: Image,
-    corner: tuple[float, float],
+    corner: tuple[int, int],
     studs: int,
     color: NDArray[np.float64],
 ) -> None:
     """Draw one brick, two studs deep, with light and shade on the studs and three random marks."""
-    stud = TEXELS_PER_METRE * STUD
-    low = np.round(corner).astype(int)
-    high = np.round(low + np.array([studs * stud, 2 * stud])).astype(int)
-    cv2.rectangle(texture, low.tolist(), high.tolist(), color.tolist(), -1)
-    cv2.rectangle(texture, low.tolist(), high.tolist(), (0.35 * color).tolist(), 2)
-    for x in range(studs):
-        for y in range(2):
-            middle = np.round(low + stud * np.array([x + 0.5, y + 0.5])).astype(int)
-            cv2.circle(texture, (middle + 3).tolist(), round(0.3 * stud), (0.45 * color).tolist(), -1)
-            cv2.circle(texture, middle.tolist(), round(0.3 * stud), np.minimum(1.3 * color, 255).tolist(), -1)
+    left, top = corner
+    size = studs * STUD, 2 * STUD
+    end = left + size[0], top + size[1]
+    rim, shade = (0.35 * color).tolist(), (0.45 * color).tolist()
+    light = np.minimum(1.3 * color, 255).tolist()
+    cv2.rectangle(texture, corner, end, color.tolist(), -1)
+    cv2.rectangle(texture, corner, end, rim, 2)
+    for x in range(left + STUD // 2, end[0], STUD):
+        for y in range(top + STUD // 2, end[1], STUD):
+            cv2.circle(texture, (x + 3, y + 3), 3 * STUD // 10, shade, -1)
+            cv2.circle(texture, (x, y), 3 * STUD // 10, light, -1)
     for _ in range(3):
-        mark = np.round(rng.uniform(low, high, (3, 2))).astype(np.int32)
-        ink = rng.uniform(0, 255, 3).tolist()
-        if rng.random() < 0.5:
+        *places, blue, green, red, line = rng.random(10)
+        mark = np.round(np.reshape(places, (3, 2)) * size + corner).astype(np.int32)
+        ink = (255 * blue, 255 * green, 255 * red)
+        if line < 0.5:
             cv2.polylines(texture, [mark], False, ink, int(rng.integers(2, 5)), cv2.LINE_AA)
         else:
             cv2.fillConvexPoly(texture, mark, ink, cv2.LINE_AA)

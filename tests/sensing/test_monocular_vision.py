@@ -9,31 +9,21 @@ from scipy.spatial.transform import Rotation
 from soro_lib.sensing.feature_matching import Features, match_descriptors, match_near
 from soro_lib.sensing.monocular_scene import ENDOSCOPE, BrickScene, ViewConditions, photograph
 from soro_lib.sensing.monocular_vision import MonocularTracker, TrackerSettings, fit_similarity
-from soro_lib.studies.visual_strain_fusion.camera_runs import metric_pose, start_tracker
+from soro_lib.studies.visual_strain_fusion.camera_runs import metric_pose
 from soro_lib.studies.visual_strain_fusion.motion import move
 
-SCENE = BrickScene(4)
+SCENE = BrickScene(1)
 
 
 def noise(rng):
     return rng.standard_normal((ENDOSCOPE.height, ENDOSCOPE.width), dtype=np.float32)
 
 
-@pytest.fixture(scope="module")
-def started():
-    """A tracker after its sweep, and its similarity; copied by the tests that move it."""
-    return start_tracker(SCENE, np.random.default_rng(1))
-
-
 @pytest.fixture
-def tracker(started):
-    import copy
-
-    original, similarity = started
-    state = {name: value for name, value in vars(original).items() if name != "_detector"}
-    clone = MonocularTracker(ENDOSCOPE)
-    vars(clone).update(copy.deepcopy(state))
-    return clone, similarity
+def tracker(sweep):
+    """A tracker after its sweep, and its similarity."""
+    assert sweep.scene == SCENE
+    return sweep.copy(), sweep.similarity
 
 
 def film(steps=40, bending=0.35):

@@ -7,7 +7,7 @@ import pytest
 from soro_lib.datacards import card_path, read_card, verified
 from soro_lib.project import data_directory
 from soro_lib.sensing.monocular_scene import undisturbed
-from soro_lib.studies.visual_strain_fusion import record
+from soro_lib.studies.visual_strain_fusion import camera_runs, record
 from soro_lib.studies.visual_strain_fusion.camera_runs import (
     COLUMNS,
     FLIGHTS,
@@ -74,7 +74,15 @@ def test_a_stored_map_is_metric_and_in_the_room():
         np.testing.assert_allclose(np.linalg.norm(point_map["directions"], axis=1), 1, atol=1e-5)
 
 
-def test_the_generator_makes_the_stored_flight_again_and_leaves_whole_files_only(tmp_path):
+def test_the_generator_makes_the_stored_flight_again_and_leaves_whole_files_only(
+    tmp_path, sweep, monkeypatch
+):
+    def swept(scene, rng, settings):
+        assert (scene, rng.bit_generator.state, settings) == (sweep.scene, sweep.before, None)
+        rng.bit_generator.state = sweep.after
+        return sweep.copy(), sweep.similarity
+
+    monkeypatch.setattr(camera_runs, "start_tracker", swept)
     progress: dict[str, int] = {}
     paths = record.record("scene1_light", tmp_path, progress, steps=4)
     assert progress == {"scene1_light": 4}
@@ -87,8 +95,6 @@ def test_the_generator_makes_the_stored_flight_again_and_leaves_whole_files_only
 
 
 def test_a_room_without_light_gives_a_clear_error(monkeypatch):
-    from soro_lib.studies.visual_strain_fusion import camera_runs
-
     dark = np.zeros((480, 640), np.uint8)
     monkeypatch.setattr(camera_runs, "photograph", lambda *_: dark)
     with pytest.raises(RuntimeError, match="no map after the sweep"):
