@@ -1,5 +1,7 @@
 """The tracker on rendered films: it finds the truth, knows when it is lost, and comes back."""
 
+import copy
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,21 +11,31 @@ from scipy.spatial.transform import Rotation
 from soro_lib.sensing.feature_matching import Features, match_descriptors, match_near
 from soro_lib.sensing.monocular_scene import ENDOSCOPE, BrickScene, ViewConditions, photograph
 from soro_lib.sensing.monocular_vision import MonocularTracker, TrackerSettings, fit_similarity
-from soro_lib.studies.visual_strain_fusion.camera_runs import metric_pose
+from soro_lib.studies.visual_strain_fusion.camera_runs import metric_pose, start_tracker
 from soro_lib.studies.visual_strain_fusion.motion import move
 
-SCENE = BrickScene(1)
+HELD_OUT = BrickScene(4)
+"""A room in which no setting was chosen."""
 
 
 def noise(rng):
     return rng.standard_normal((ENDOSCOPE.height, ENDOSCOPE.width), dtype=np.float32)
 
 
-@pytest.fixture
-def tracker(sweep):
-    """A tracker after its sweep, and its similarity."""
-    assert sweep.scene == SCENE
-    return sweep.copy(), sweep.similarity
+@pytest.fixture(scope="module")
+def held_out_sweep():
+    return start_tracker(HELD_OUT, np.random.default_rng(1))
+
+
+@pytest.fixture(params=["swept for all tests", pytest.param("held out", marks=pytest.mark.soak)])
+def flight(request):
+    """The scene, a tracker after its sweep there, and its similarity."""
+    if request.param == "held out":
+        tracker, similarity = request.getfixturevalue("held_out_sweep")
+        detector = tracker._detector
+        return HELD_OUT, copy.deepcopy(tracker, {id(detector): detector}), similarity
+    sweep = request.getfixturevalue("sweep")
+    return sweep.scene, sweep.copy(), sweep.similarity
 
 
 def film(steps=40, bending=0.35):
@@ -31,17 +43,17 @@ def film(steps=40, bending=0.35):
     return move(bending * out * np.array([[0.7, 0.7]]))
 
 
-def fly(tracker, similarity, poses, conditions, rng):
+def fly(scene, tracker, similarity, poses, conditions, rng):
     frames = [
-        tracker.track(photograph(SCENE, pose, conditions(k), noise(rng))) for k, pose in enumerate(poses)
+        tracker.track(photograph(scene, pose, conditions(k), noise(rng))) for k, pose in enumerate(poses)
     ]
     seen = np.array([metric_pose(frame.pose, similarity)[:3] for frame in frames])
     return frames, 1e3 * np.linalg.norm(seen - poses[:, :3], axis=1)
 
 
-def test_the_tip_is_found_to_a_millimetre(tracker):
+def test_the_tip_is_found_to_a_millimetre(flight):
     motion = film()
-    frames, error = fly(*tracker, motion.pose, lambda k: ViewConditions(), np.random.default_rng(2))
+    frames, error = fly(*flight, motion.pose, lambda k: ViewConditions(), np.random.default_rng(2))
     assert all(frame.tracked for frame in frames)
     assert error.mean() < 0.8
     assert error.max() < 2.0
@@ -49,23 +61,23 @@ def test_the_tip_is_found_to_a_millimetre(tracker):
     assert all(0.3 < frame.inlier_error < 1.6 for frame in frames)
 
 
-def test_the_orientation_is_found_to_a_degree(tracker):
-    track, similarity = tracker
+def test_the_orientation_is_found_to_a_degree(flight):
+    scene, track, similarity = flight
     motion = film(20)
     rng = np.random.default_rng(3)
     for pose in motion.pose:
-        frame = track.track(photograph(SCENE, pose, ViewConditions(), noise(rng)))
+        frame = track.track(photograph(scene, pose, ViewConditions(), noise(rng)))
     seen = metric_pose(frame.pose, similarity)
     assert np.linalg.norm(seen[3:]) == pytest.approx(1)
     turned = Rotation.from_quat(seen[3:]) * Rotation.from_quat(motion.pose[-1, 3:]).inv()
     assert np.degrees(turned.magnitude()) < 1.5
 
 
-def test_the_stated_spread_is_of_the_size_of_the_jitter(tracker):
-    track, similarity = tracker
+def test_the_stated_spread_is_of_the_size_of_the_jitter(flight):
+    scene, track, similarity = flight
     rng = np.random.default_rng(4)
     pose = film(2).pose[0]
-    frames = [track.track(photograph(SCENE, pose, ViewConditions(), noise(rng))) for _ in range(12)]
+    frames = [track.track(photograph(scene, pose, ViewConditions(), noise(rng))) for _ in range(12)]
     places = np.array([similarity[1] * frame.pose[:3, 3] for frame in frames[2:]])
     jitter = np.sqrt(places.var(axis=0, ddof=1).sum())
     stated = similarity[1] * np.mean([frame.position_spread for frame in frames[2:]])
@@ -73,37 +85,37 @@ def test_the_stated_spread_is_of_the_size_of_the_jitter(tracker):
 
 
 @pytest.mark.parametrize("conditions", [ViewConditions(covered=True), ViewConditions(light=0.0), None])
-def test_a_lost_camera_holds_its_last_pose_and_comes_back(tracker, conditions):
-    track, similarity = tracker
+def test_a_lost_camera_holds_its_last_pose_and_comes_back(flight, conditions):
+    scene, track, similarity = flight
     rng = np.random.default_rng(5)
     motion = film(40, 0.25)
     for pose in motion.pose[:5]:
-        held = track.track(photograph(SCENE, pose, ViewConditions(), noise(rng)))
+        held = track.track(photograph(scene, pose, ViewConditions(), noise(rng)))
     for pose in motion.pose[5:12]:
-        image = None if conditions is None else photograph(SCENE, pose, conditions, noise(rng))
+        image = None if conditions is None else photograph(scene, pose, conditions, noise(rng))
         lost = track.track(image)
         assert not lost.tracked
         assert lost.inlier_error == lost.match_error == lost.position_spread == np.inf
         np.testing.assert_array_equal(lost.pose, held.pose)
-    back = [track.track(photograph(SCENE, motion.pose[30], ViewConditions(), noise(rng))) for _ in range(5)]
+    back = [track.track(photograph(scene, motion.pose[30], ViewConditions(), noise(rng))) for _ in range(5)]
     assert back[-1].tracked
     error = 1e3 * np.linalg.norm(metric_pose(back[-1].pose, similarity)[:3] - motion.pose[30, :3])
     assert error < 2.0
 
 
-def test_relocalisation_needs_no_idea_of_where_the_camera_is(tracker):
-    track, similarity = tracker
+def test_relocalisation_needs_no_idea_of_where_the_camera_is(flight):
+    scene, track, similarity = flight
     rng = np.random.default_rng(6)
     track._pose = track._pose @ np.diag([-1.0, -1.0, 1.0, 1.0])
     track._lost = track.settings.relocalise_every
     pose = film(2, 0.2).pose[1]
-    frame = track.track(photograph(SCENE, pose, ViewConditions(), noise(rng)))
+    frame = track.track(photograph(scene, pose, ViewConditions(), noise(rng)))
     assert frame.tracked
     assert 1e3 * np.linalg.norm(metric_pose(frame.pose, similarity)[:3] - pose[:3]) < 2.0
 
 
-def test_ten_seconds_without_a_camera_change_nothing_in_the_map(tracker):
-    track, _ = tracker
+def test_ten_seconds_without_a_camera_change_nothing_in_the_map(flight):
+    _, track, _ = flight
     before = track.map.positions.copy()
     pose = track._pose.copy()
     for _ in range(200):
@@ -113,10 +125,10 @@ def test_ten_seconds_without_a_camera_change_nothing_in_the_map(tracker):
     np.testing.assert_array_equal(track.map.positions, before)
 
 
-def test_a_hand_takes_features_but_not_the_pose(tracker):
+def test_a_hand_takes_features_but_not_the_pose(flight):
     hand = ViewConditions(hand=(0.1, 0.2, 0.5))
-    frames, error = fly(*tracker, film(12, 0.1).pose, lambda k: hand, np.random.default_rng(7))
-    clear, _ = fly(*tracker, film(2, 0.1).pose, lambda k: ViewConditions(), np.random.default_rng(7))
+    frames, error = fly(*flight, film(12, 0.1).pose, lambda k: hand, np.random.default_rng(7))
+    clear, _ = fly(*flight, film(2, 0.1).pose, lambda k: ViewConditions(), np.random.default_rng(7))
     assert all(frame.tracked for frame in frames)
     assert np.mean([frame.inliers for frame in frames]) < 0.8 * clear[-1].inliers
     assert error.max() < 3.0
@@ -127,7 +139,7 @@ def test_without_movement_there_is_no_map():
     rng = np.random.default_rng(8)
     pose = film(2).pose[0]
     for _ in range(4):
-        frame = tracker.track(photograph(SCENE, pose, ViewConditions(), noise(rng)))
+        frame = tracker.track(photograph(HELD_OUT, pose, ViewConditions(), noise(rng)))
     assert not frame.tracked
     assert not tracker.initialised
     assert frame.features == 600
