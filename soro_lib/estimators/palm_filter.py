@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
@@ -62,15 +63,21 @@ PAPER_SETTINGS = PalmFilterSettings(position_sd=math.sqrt(0.7) * 1e-3, velocity_
 
 def transition_matrix(interval: float) -> Array:
     """Return the constant-acceleration transition F (9, 9) over ``interval`` [s]; Lai et al., Eq. (7)."""
-    axis = np.array([[1.0, interval, 0.5 * interval**2], [0.0, 1.0, interval], [0.0, 0.0, 1.0]])
-    return np.asarray(np.kron(np.eye(3), axis), dtype=np.float64)
+    return np.asarray(np.kron(np.eye(3), axis_transition(interval)), dtype=np.float64)
+
+
+def axis_transition(interval: float) -> Array:
+    """Return the block (3, 3) of the transition that moves one axis."""
+    return np.array([[1.0, interval, 0.5 * interval**2], [0.0, 1.0, interval], [0.0, 0.0, 1.0]])
 
 
 class PalmFilter:
     """Constant-acceleration Kalman filter of the palm position; Lai et al., Eqs. (6)-(12).
 
-    The state is (x, vx, ax, y, vy, ay, z, vz, az) in the device frame, SI units. The filter starts on the
-    first measurement and takes intervals from the device clock, so that holes in the stream do no harm.
+    The paper's state of nine numbers falls into three axes that move and are measured alike, so that one
+    covariance (3, 3) serves them all; `ReadablePalmFilter` is the same filter as the paper writes it. The
+    filter starts on the first measurement and takes intervals from the device clock, so that holes in the
+    stream do no harm.
 
     Parameters
     ----------
@@ -86,11 +93,7 @@ class PalmFilter:
 
     def __init__(self, settings: PalmFilterSettings | None = None) -> None:
         self.settings = settings or PalmFilterSettings()
-        variances = (self.settings.position_sd**2, self.settings.velocity_sd**2)
-        self._noise = np.diag(np.tile(variances, 3))
-        self._position_noise = np.eye(3) * variances[0]
-        self._filter = KalmanFilter(dim_x=9, dim_z=6)
-        self._filter.F, self._filter.Q = np.eye(9), np.zeros((9, 9))
+        self._variances = np.array([self.settings.position_sd**2, self.settings.velocity_sd**2])
         self.reset()
 
     def reset(self) -> None:
@@ -98,22 +101,34 @@ class PalmFilter:
         self.time: float | None = None
         self.process_scale = 1.0
         self._innovations: deque[Array] = deque(maxlen=self.settings.window)
+        self._begin(np.zeros(3))
+
+    @property
+    def state(self) -> Array:
+        """Estimate (3, 3) in the device frame: per axis position [m], velocity [m/s], acceleration
+        [m/s^2]."""
+        return self._state.copy()
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (3, 3) of the estimate of one axis, the same for all axes."""
+        return self._covariance.copy()
 
     @property
     def position(self) -> Array:
         """Filtered palm position (3,) [m]."""
-        return self._filter.x[::3, 0].copy()
+        return self.state[:, 0].copy()
 
     @property
     def velocity(self) -> Array:
         """Filtered palm velocity (3,) [m/s]."""
-        return self._filter.x[1::3, 0].copy()
+        return self.state[:, 1].copy()
 
     def predicted(self, time: float) -> Array:
         """Return the palm position (3,) [m] expected at ``time`` [s], without touching the filter."""
         if self.time is None:
             raise ValueError("PalmFilter.predicted: no measurement has been seen yet")
-        return (transition_matrix(time - self.time) @ self._filter.x)[::3, 0]
+        return self.state @ axis_transition(time - self.time)[0]
 
     def update(self, time: float, position: ArrayLike, velocity: ArrayLike | None = None) -> Array:
         """Take in one measurement.
@@ -138,95 +153,181 @@ class PalmFilter:
             If the measurement is not finite or time does not increase.
         """
         position = np.asarray(position, dtype=float)
-        if position.shape != (3,) or not np.isfinite(position).all():
+        if position.shape != (3,) or not all(map(math.isfinite, position.tolist())):
             raise ValueError(f"PalmFilter.update: position = {position}, must be 3 finite numbers")
         if self.time is None:
-            return self._start(time, position)
+            self._begin(position)
+            self.time = time
+            return position
         interval = time - self.time
         if not interval > 0:
             raise ValueError(f"PalmFilter.update: time {time} s does not follow {self.time} s")
-        self._predict(interval)
-        if velocity is None:
-            self._correct(position, MEASURED_POSITION, self._position_noise)
-        else:
-            both = np.empty(6)
-            both[::2], both[1::2] = position, velocity
-            self._correct(both, MEASURED, self._noise)
+        measured = np.empty((3, 1 if velocity is None else 2))
+        measured[:, 0] = position
+        if velocity is not None:
+            measured[:, 1] = velocity
+        self._predict(interval, self.process_scale * self.settings.acceleration_density**2 * interval)
+        if self.settings.adaptive:
+            self._adapt(measured)
+        self._correct(measured)
         self.time = time
         return self.position
 
-    def _start(self, time: float, position: Array) -> Array:
-        self.time = time
-        self._filter.x = np.zeros((9, 1))
+    def _begin(self, position: Array) -> None:
+        """Rest at a position (3,)."""
+        self._state, self._covariance = np.zeros((3, 3)), self.settings.initial_variance * np.eye(3)
+        self._state[:, 0] = position
+
+    def _predict(self, interval: float, process_variance: float) -> None:
+        _predict(self._state, self._covariance, interval, process_variance)
+
+    def _correct(self, measured: Array) -> None:
+        _correct(self._state, self._covariance, measured, self._variances)
+
+    def _adapt(self, measured: Array) -> None:
+        """Scale Q by the root of measured over predicted innovation power (Ding et al. 2007)."""
+        kinds = measured.shape[1]
+        if self._innovations and self._innovations[-1].shape != measured.shape:
+            self._innovations.clear()  # the tracker began or ceased to report velocities
+        self._innovations.append(measured - self.state[:, :kinds])
+        if len(self._innovations) < self.settings.window:
+            return
+        noise = 3 * self._variances[:kinds].sum()
+        power = np.mean(np.square(self._innovations)) * measured.size - noise
+        predicted = 3 * np.trace(self.covariance[:kinds, :kinds])
+        factor = math.sqrt(max(power, 0.0) / predicted)
+        self.process_scale = min(max(self.process_scale * min(max(factor, 0.5), 2.0), 1e-3), 1e3)
+
+
+@njit(cache=True)
+def _predict(state: Array, covariance: Array, interval: float, process_variance: float) -> None:
+    """A priori state and covariance, in place; Eqs. (6a), (9). Erratum GS-9: (9) starts from the posterior.
+
+    Twice the shift by ``interval``: of the rows, then of the columns of ``F P F'``.
+    """
+    half = 0.5 * interval**2
+    for k in range(3):
+        state[k, 0] += interval * state[k, 1] + half * state[k, 2]
+        state[k, 1] += interval * state[k, 2]
+    for k in range(3):
+        covariance[0, k] += interval * covariance[1, k] + half * covariance[2, k]
+        covariance[1, k] += interval * covariance[2, k]
+    for k in range(3):
+        covariance[k, 0] += interval * covariance[k, 1] + half * covariance[k, 2]
+        covariance[k, 1] += interval * covariance[k, 2]
+    covariance[2, 2] += process_variance
+
+
+@njit(cache=True)
+def _correct(state: Array, covariance: Array, measured: Array, variances: Array) -> None:
+    """A posteriori state and covariance, in place; Lai et al., Eqs. (10)-(12).
+
+    Positions and velocities have independent noise, so one is taken in after the other: the innovation
+    covariance of (10) is then a number. The covariance of (11) is in Joseph's form, ``(I - K H) P (I - K H)'
+    + K R K'``, which stays positive after a long hole in the stream.
+    """
+    gain = np.empty(3)
+    for kind in range(measured.shape[1]):
+        innovation_variance = covariance[kind, kind] + variances[kind]
+        for i in range(3):
+            gain[i] = covariance[i, kind] / innovation_variance
+        for axis in range(3):
+            innovation = measured[axis, kind] - state[axis, kind]
+            for i in range(3):
+                state[axis, i] += gain[i] * innovation
+        for j in range(3):
+            seen = covariance[kind, j]
+            for i in range(3):
+                covariance[i, j] -= gain[i] * seen
+        for i in range(3):
+            seen = covariance[i, kind]
+            for j in range(3):
+                covariance[i, j] += gain[j] * (gain[i] * variances[kind] - seen)
+
+
+class ReadablePalmFilter(PalmFilter):
+    """The same filter with the matrices of the paper, on filterpy: the reference for `PalmFilter`.
+
+    The state is (x, vx, ax, y, vy, ay, z, vz, az) in the device frame, SI units.
+    """
+
+    def _begin(self, position: Array) -> None:
+        from filterpy.kalman import KalmanFilter
+
+        self._filter = KalmanFilter(dim_x=9, dim_z=6)
         self._filter.x[::3, 0] = position
         self._filter.P = self.settings.initial_variance * np.eye(9)
-        return position
 
-    def _predict(self, interval: float) -> None:
-        """A priori state and covariance; Eqs. (6a), (9). Erratum GS-9: (9) starts from the posterior."""
-        transition, process = self._filter.F, self._filter.Q
-        for axis in (0, 3, 6):
-            transition[axis, axis + 1] = transition[axis + 1, axis + 2] = interval
-            transition[axis, axis + 2] = 0.5 * interval**2
-            process[axis + 2, axis + 2] = (
-                self.process_scale * self.settings.acceleration_density**2 * interval
-            )
-        self._filter.predict()
+    @property
+    def state(self) -> Array:
+        return self._filter.x.reshape(3, 3)
 
-    def _correct(self, measurement: Array, observation: Array, noise: Array) -> None:
+    @property
+    def covariance(self) -> Array:
+        return self.whole_covariance[:3, :3]
+
+    @property
+    def whole_covariance(self) -> Array:
+        """Covariance (9, 9) of the estimate."""
+        return self._filter.P
+
+    def _predict(self, interval: float, process_variance: float) -> None:
+        """A priori state and covariance; Lai et al., Eqs. (6a), (9)."""
+        process = np.kron(np.eye(3), np.diag([0.0, 0.0, process_variance]))
+        self._filter.predict(F=transition_matrix(interval), Q=process)
+
+    def _correct(self, measured: Array) -> None:
         """Gain, a posteriori covariance and state; Lai et al., Eqs. (10)-(12)."""
-        if self.settings.adaptive:
-            self._adapt(measurement, observation, noise)
-        self._filter.update(measurement[:, None], R=noise, H=observation)
-
-    def _adapt(self, measurement: Array, observation: Array, noise: Array) -> None:
-        """Scale Q by the root of measured over predicted innovation power (Ding et al. 2007)."""
-        self._innovations.append(measurement - (observation @ self._filter.x)[:, 0])
-        if len(self._innovations) < self.settings.window or len(self._innovations[0]) != len(measurement):
-            return
-        measured = np.mean(np.square(self._innovations)) * len(measurement) - np.trace(noise)
-        predicted = np.trace(observation @ self._filter.P @ observation.T)
-        factor = math.sqrt(max(measured, 0.0) / predicted)
-        self.process_scale = min(max(self.process_scale * min(max(factor, 0.5), 2.0), 1e-3), 1e3)
+        kinds = measured.shape[1]
+        observation = MEASURED if kinds == 2 else MEASURED_POSITION
+        noise = np.diag(np.tile(self._variances[:kinds], 3))
+        self._filter.update(measured.reshape(-1, 1), R=noise, H=observation)
 
 
 # --- orientation -------------------------------------------------------------------------------------------
 
 
-def slerp(start: ArrayLike, end: ArrayLike, share: float) -> Array:
+# On tuples of plain floats: one direction at a time, which at this size is faster than arrays.
+
+Quaternion = tuple[float, float, float, float]
+
+
+def slerp(start: Sequence[float], end: Sequence[float], share: float) -> Quaternion:
     """Interpolate between two unit quaternions on the shorter great circle; Lai et al., Eqs. (13)-(15).
 
     Erratum GS-10: the second term of (13) carries the orthonormalised quaternion of (14), not the end itself.
 
     Parameters
     ----------
-    start, end : array_like (4,)
+    start, end : sequence of 4 float
         Unit quaternions, any component order; q and -q are the same rotation.
     share : float
         0 gives ``start``, 1 gives ``end``.
 
     Returns
     -------
-    array (4,)
+    tuple of 4 float
         Unit quaternion.
     """
-    start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-    cosine = float(start @ end)
+    s0, s1, s2, s3 = start
+    e0, e1, e2, e3 = end
+    cosine = s0 * e0 + s1 * e1 + s2 * e2 + s3 * e3
     if cosine < 0.0:  # Erratum GS-11
-        cosine, end = -cosine, -end
-    orthogonal = end - cosine * start
-    length = math.sqrt(float(orthogonal @ orthogonal))
+        cosine, e0, e1, e2, e3 = -cosine, -e0, -e1, -e2, -e3
+    o0, o1, o2, o3 = e0 - cosine * s0, e1 - cosine * s1, e2 - cosine * s2, e3 - cosine * s3
+    length = math.sqrt(o0 * o0 + o1 * o1 + o2 * o2 + o3 * o3)
     if length < 1e-12:
-        return start.copy()
+        return s0, s1, s2, s3
     angle = math.atan2(length, cosine)
-    return start * math.cos(share * angle) + orthogonal * (math.sin(share * angle) / length)
+    kept, turned = math.cos(share * angle), math.sin(share * angle) / length
+    return kept * s0 + turned * o0, kept * s1 + turned * o1, kept * s2 + turned * o2, kept * s3 + turned * o3
 
 
-def angular_distance(start: ArrayLike, end: ArrayLike) -> float:
-    """Return the rotation angle [rad] between two unit quaternions (4,), in [0, pi]; Lai et al., Eq. (16)."""
-    start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-    cosine = abs(float(start @ end))
-    return 2.0 * math.acos(min(cosine, 1.0))
+def angular_distance(start: Sequence[float], end: Sequence[float]) -> float:
+    """Return the rotation angle [rad] between two unit quaternions, in [0, pi]; Lai et al., Eq. (16)."""
+    s0, s1, s2, s3 = start
+    e0, e1, e2, e3 = end
+    return 2.0 * math.acos(min(abs(s0 * e0 + s1 * e1 + s2 * e2 + s3 * e3), 1.0))
 
 
 def low_pass_share(distance: float, range_limit: float, low_pass: float) -> float:
@@ -244,17 +345,17 @@ def low_pass_share(distance: float, range_limit: float, low_pass: float) -> floa
     return min(max(distance / math.pi * range_limit + low_pass, 0.0), 1.0)
 
 
-def direction_quaternion(direction: ArrayLike) -> Array:
-    """Return the twist-free quaternion (w, x, y, z) that turns e_z into a unit vector (3,)."""
-    x, y, z = np.asarray(direction, dtype=float).tolist()
+def direction_quaternion(direction: Sequence[float]) -> Quaternion:
+    """Return the twist-free quaternion (w, x, y, z) that turns e_z into a unit vector."""
+    x, y, z = direction
     scale = 1.0 / math.sqrt(max(2.0 + 2.0 * z, 1e-18))
-    return np.array([(1.0 + z) * scale, -y * scale, x * scale, 0.0])
+    return (1.0 + z) * scale, -y * scale, x * scale, 0.0
 
 
-def quaternion_direction(quaternion: ArrayLike) -> Array:
-    """Return e_z turned by the unit quaternion (w, x, y, z): the pointing direction (3,)."""
-    w, x, y, z = np.asarray(quaternion, dtype=float).tolist()
-    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+def quaternion_direction(quaternion: Sequence[float]) -> tuple[float, float, float]:
+    """Return e_z turned by the unit quaternion (w, x, y, z): the pointing direction."""
+    w, x, y, z = quaternion
+    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
 
 
 class DirectionFilter:
@@ -274,7 +375,7 @@ class DirectionFilter:
     ----------
     direction : ndarray (3,)
         Filtered unit direction.
-    quaternion : ndarray (4,)
+    quaternion : tuple of 4 float
         The same as a twist-free quaternion (w, x, y, z).
     """
 
@@ -287,15 +388,17 @@ class DirectionFilter:
 
     def reset(self, direction: ArrayLike) -> None:
         """Start anew from a unit direction (3,)."""
-        self.quaternion = direction_quaternion(direction)
-        self.direction = quaternion_direction(self.quaternion)
+        self._turn_to(direction_quaternion(np.asarray(direction, dtype=float).tolist()))
 
     def update(self, interval: float, direction: ArrayLike) -> Array:
         """Turn towards the unit vector ``direction`` (3,) for ``interval`` [s] and return the result (3,)."""
-        target = direction_quaternion(direction)
+        target = direction_quaternion(np.asarray(direction, dtype=float).tolist())
         low_pass = -math.expm1(-interval / self.time_constant)
         distance = angular_distance(self.quaternion, target)
         share = low_pass_share(distance, self.range_ratio * low_pass, low_pass)
-        self.quaternion = slerp(self.quaternion, target, share)
-        self.direction = quaternion_direction(self.quaternion)
+        self._turn_to(slerp(self.quaternion, target, share))
         return self.direction
+
+    def _turn_to(self, quaternion: Quaternion) -> None:
+        self.quaternion = quaternion
+        self.direction = np.array(quaternion_direction(quaternion))

@@ -1,5 +1,7 @@
 """Palm filter against a textbook recursion, spherical interpolation against SciPy, and their errata."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,6 +15,7 @@ from soro_lib.estimators.palm_filter import (
     PAPER_SETTINGS,
     DirectionFilter,
     PalmFilterSettings,
+    ReadablePalmFilter,
     angular_distance,
     direction_quaternion,
     low_pass_share,
@@ -97,7 +100,45 @@ def test_covariance_recursion_starts_from_the_posterior():
     palm_filter, times = PalmFilter(settings), 0.03 * np.arange(500)
     for time in times:
         palm_filter.update(time, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    np.testing.assert_allclose(palm_filter._filter.P, corrected, atol=1e-9)
+    np.testing.assert_allclose(np.kron(np.eye(3), palm_filter.covariance), corrected, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("adaptive", [False, True])
+@pytest.mark.parametrize("noise", [PalmFilterSettings(), PAPER_SETTINGS], ids=["ours", "paper"])
+def test_filter_of_one_axis_equals_the_readable_one(noise, adaptive, seed):
+    """Irregular clock, holes of up to 0.2 s, velocity that comes and goes, a new start half way.
+
+    After a longer hole the gate starts the filter anew; there filterpy's inverse would lose digits.
+    """
+    rng = np.random.default_rng(seed)
+    settings = replace(noise, adaptive=adaptive)
+    filters = PalmFilter(settings), ReadablePalmFilter(settings)
+    time, known = 0.0, True
+    for index in range(400):
+        time += rng.uniform(0.05, 0.2) if rng.random() < 0.02 else rng.uniform(0.002, 0.03)
+        known = known if rng.random() < 0.97 else not known  # long enough for the window of the adaptation
+        rates = np.array([1.0, 2.0, 3.0])
+        position = 0.1 * np.sin(time * rates) + 3e-4 * rng.standard_normal(3)
+        velocity = 0.1 * rates * np.cos(time * rates) + 0.04 * rng.standard_normal(3) if known else None
+        if index == 200:
+            for palm_filter in filters:
+                palm_filter.reset()
+        ours, readable = (palm_filter.update(time, position, velocity) for palm_filter in filters)
+        np.testing.assert_allclose(ours, readable, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(filters[0].state, filters[1].state, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(*(f.predicted(time + 0.05) for f in filters), rtol=0, atol=1e-11)
+        assert filters[0].process_scale == pytest.approx(filters[1].process_scale, rel=1e-9)
+    assert (filters[0].process_scale != 1.0) == adaptive
+
+
+def test_axes_of_the_readable_filter_share_one_covariance():
+    times, positions, velocities = wave()
+    palm_filter = ReadablePalmFilter()
+    for measurement in zip(times, positions, velocities):
+        palm_filter.update(*measurement)
+    whole = palm_filter.whole_covariance
+    np.testing.assert_allclose(whole, np.kron(np.eye(3), whole[:3, :3]), rtol=1e-9, atol=1e-18)
 
 
 def test_filter_without_velocity_still_follows():
@@ -223,7 +264,7 @@ def test_share_is_clipped():
 @given(st.floats(0, 3.0), st.floats(-np.pi, np.pi))
 def test_direction_quaternion_is_twist_free_and_turns_e_z(tilt, azimuth):
     direction = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)])
-    quaternion = direction_quaternion(direction)
+    quaternion = np.array(direction_quaternion(direction))
     assert quaternion[3] == 0
     np.testing.assert_allclose(quaternion_direction(quaternion), direction, atol=1e-12)
     np.testing.assert_allclose(
