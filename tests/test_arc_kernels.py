@@ -24,8 +24,9 @@ def test_compiled_chain_equals_the_chain(chain, scale):
 def test_swing_adds_the_turn_times_the_lever():
     rng = np.random.default_rng(1)
     velocities, lever = rng.normal(size=(6, 5)), rng.normal(size=3)
-    expected = velocities[:3] + np.cross(velocities[3:].T, lever).T
-    turn = velocities[3:].copy()
-    swing(velocities, lever)
-    np.testing.assert_allclose(velocities[:3], expected, atol=1e-14)
-    np.testing.assert_array_equal(velocities[3:], turn)
+    expected = velocities.copy()
+    expected[:3, 1:4] += np.cross(velocities[3:, 1:4].T, lever).T
+    swing(velocities, 1, tuple(lever))
+    np.testing.assert_allclose(velocities[:3], expected[:3], atol=1e-14)
+    np.testing.assert_array_equal(velocities[3:], expected[3:])
+    np.testing.assert_array_equal(velocities[:, [0, 4]], expected[:, [0, 4]])

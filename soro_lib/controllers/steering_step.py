@@ -317,11 +317,15 @@ def _normal_equations(  # type: ignore[no-untyped-def]
     hessian, gradient = np.zeros((actuators, actuators)), np.zeros(actuators)
     _add_squares(hessian, gradient, first, wanted1, weight1, units)
     _add_squares(hessian, gradient, second, wanted2, weight2, units)
+    low, high = np.empty(actuators), np.empty(actuators)
+    total = 0.0
     for i in range(actuators):
         hessian[i, i] += (slide_damping if units[i] == MILLIMETRE else damping) ** 2
-    low, high = lower / units, upper / units
-    finite = np.isfinite(hessian.sum() + gradient.sum() + low.sum() + high.sum())
-    return hessian, gradient, low, high, finite
+        low[i], high[i] = lower[i] / units[i], upper[i] / units[i]
+        total += gradient[i] + low[i] + high[i]
+        for j in range(actuators):
+            total += hessian[i, j]
+    return hessian, gradient, low, high, np.isfinite(total)
 
 
 # --- solving -----------------------------------------------------------------------------------------------

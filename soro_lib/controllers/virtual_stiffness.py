@@ -21,6 +21,8 @@ from soro_lib.robots.helix import HelixArm
 from soro_lib.robots.helix_kernels import (
     cholesky,
     cholesky_solve,
+    dot,
+    largest,
     multiply,
     outer_gram,
     tip_points_and_jacobian,
@@ -182,14 +184,27 @@ def weighted_step(jacobian: Array, inverse_stiffness: Array, error: Array, stret
     The one direction that J cannot reach is known (`stretch`): filling it makes the matrix invertible, and
     taking it out of the error makes the answer the pseudo-inverse's.
     """
-    gram = outer_gram(jacobian * np.sqrt(inverse_stiffness))
-    mean = np.trace(gram) / 6
+    softened = np.empty((6, 9))
+    for j in range(9):
+        root = np.sqrt(inverse_stiffness[j])
+        for i in range(6):
+            softened[i, j] = jacobian[i, j] * root
+    gram = outer_gram(softened)
+    mean = 0.0
     for i in range(6):
+        mean += gram[i, i]
+    mean /= 6
+    along = dot(stretch, error)
+    reachable = np.empty(6)
+    for i in range(6):
+        reachable[i] = error[i] - along * stretch[i]
         for j in range(6):
             gram[i, j] += mean * stretch[i] * stretch[j]
         gram[i, i] += DAMPING * mean
-    reachable = error - (stretch * error).sum() * stretch
-    return inverse_stiffness * multiply(jacobian.T, cholesky_solve(cholesky(gram), reachable))
+    step = multiply(jacobian.T, cholesky_solve(cholesky(gram), reachable))
+    for j in range(9):
+        step[j] *= inverse_stiffness[j]
+    return step
 
 
 @njit(cache=True)
@@ -214,8 +229,11 @@ def reach_goal(
     new_sys = q_sys
     new_est = q_est
     points, jacobian = tip_points_and_jacobian(q_est, gripper_length)
-    shift = measured_points - points if from_measurement else np.zeros(6)
-    error = goal_step - measured_points
+    shift, error = np.zeros(6), np.empty(6)
+    for k in range(6):
+        error[k] = goal_step[k] - measured_points[k]
+        if from_measurement:
+            shift[k] = measured_points[k] - points[k]
     converged = False
     crops = 0
     iterations = 0
@@ -223,15 +241,21 @@ def reach_goal(
     while iterations < max_iterations:
         iterations += 1
         step = weighted_step(jacobian, softness, error, unreachable_direction(points))
-        step *= min(1.0, LARGEST_STEP / max(np.abs(step).max(), 1e-300))
-        wanted = q_sys + step
+        share = min(1.0, LARGEST_STEP / max(largest(step), 1e-300))
+        wanted = np.empty(9)
+        for i in range(9):
+            wanted[i] = q_sys[i] + share * step[i]
         q_sys = wanted.copy()
         crops += limit_state_in_place(q_sys, softness, lower, upper)
-        softness = np.maximum(softness, STIFFEST * inverse_stiffness)
-        q_est = q_est + step + (q_sys - wanted)
+        moved = np.empty(9)
+        for i in range(9):
+            softness[i] = max(softness[i], STIFFEST * inverse_stiffness[i])
+            moved[i] = q_est[i] + share * step[i] + (q_sys[i] - wanted[i])
+        q_est = moved
         points, jacobian = tip_points_and_jacobian(q_est, gripper_length)
-        error = goal_step - (points + shift)
-        residual = np.sqrt((error**2).sum())
+        for k in range(6):
+            error[k] = goal_step[k] - (points[k] + shift[k])
+        residual = np.sqrt(dot(error, error))
         if residual < tolerance:
             new_sys, new_est, converged = q_sys, q_est, True
             if early_exit:

@@ -15,6 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from soro_lib.robots.helix_kernels import (
     cholesky,
     cholesky_solve,
+    dot,
+    largest,
     multiply,
     outer_gram,
     tip_points_and_jacobian,
@@ -154,17 +156,28 @@ def sequential_least_distance(
     multiplier = 0.0
     for iteration in range(1, MAXIMUM_ITERATIONS + 1):
         points, jacobian = tip_points_and_jacobian(q, gripper_length)
-        residual = points - measured_points - multiply(jacobian, q - q_sys)
+        away = np.empty(9)
+        for j in range(9):
+            away[j] = q[j] - q_sys[j]
+        covered = multiply(jacobian, away)
+        residual = np.empty(6)
+        for i in range(6):
+            residual[i] = points[i] - measured_points[i] - covered[i]
+            for j in range(9):
+                jacobian[i, j] /= weights[j]
         stretch = unreachable_direction(points)
-        move, multiplier = least_distance(jacobian / weights, residual, stretch, bound, multiplier)
-        step = q_sys + move / weights - q
-        largest = np.abs(step).max()
-        if largest < STEP_TOLERANCE:
+        move, multiplier = least_distance(jacobian, residual, stretch, bound, multiplier)
+        step = np.empty(9)
+        for j in range(9):
+            step[j] = q_sys[j] + move[j] / weights[j] - q[j]
+        longest = largest(step)
+        if longest < STEP_TOLERANCE:
             return q, iteration, True
-        factor = min(1.0, LARGEST_STEP / largest)
+        factor = min(1.0, LARGEST_STEP / longest)
         if iteration > FULL_STEP_ITERATIONS:
             factor *= 0.5
-        q = q + factor * step
+        for j in range(9):
+            q[j] += factor * step[j]
     return q, MAXIMUM_ITERATIONS, False
 
 
@@ -180,22 +193,32 @@ def least_distance(
     which no p can change (Erratum SH-9), is paid from the bound, or left out where it alone exceeds the
     bound.
     """
-    fixed = (stretch * residual).sum()
-    reachable = residual - fixed * stretch
+    fixed = dot(stretch, residual)
+    reachable = np.empty(6)
+    for i in range(6):
+        reachable[i] = residual[i] - fixed * stretch[i]
     allowed = bound if abs(fixed) >= bound else np.sqrt(bound * bound - fixed * fixed)
-    if (reachable**2).sum() <= allowed * allowed:
-        return np.zeros(matrix.shape[1]), 0.0
+    if dot(reachable, reachable) <= allowed * allowed:
+        return np.zeros(9), 0.0
     gram = outer_gram(matrix)
     remainder = reachable
     for _ in range(50):
-        factor = cholesky(np.eye(6) + multiplier * gram)
+        system = np.empty((6, 6))
+        for i in range(6):
+            for j in range(6):
+                system[i, j] = multiplier * gram[i, j]
+            system[i, i] += 1.0
+        factor = cholesky(system)
         remainder = cholesky_solve(factor, reachable)
-        length = np.sqrt((remainder**2).sum())
+        length = np.sqrt(dot(remainder, remainder))
         if abs(length - allowed) <= 1e-12 * allowed:
             break
-        slope = (remainder * cholesky_solve(factor, multiply(gram, remainder))).sum() / length**3
+        slope = dot(remainder, cholesky_solve(factor, multiply(gram, remainder))) / length**3
         multiplier = max(0.0, multiplier + (1 / allowed - 1 / length) / slope)
-    return -multiplier * multiply(matrix.T, remainder), multiplier
+    move = multiply(matrix.T, remainder)
+    for j in range(9):
+        move[j] *= -multiplier
+    return move, multiplier
 
 
 def estimate_shape_by_slsqp(

@@ -89,17 +89,20 @@ def _kinematics(q: Array, parameters: Array) -> tuple[Array, Array, Array, Array
     soft, soft_slope = _soft_segments(q, parameters)
     step = 2 if cap > 0 else 1  # a cap is a straight piece after each soft one
     pieces = np.zeros((2 * step, 3))
-    pieces[0], pieces[step] = soft[0], soft[1]
+    for k in range(3):
+        pieces[0, k], pieces[step, k] = soft[0, k], soft[1, k]
     if cap > 0:
         pieces[1, 2] = pieces[3, 2] = cap
     mid_frame, mid_velocities = chain_frame_and_jacobian(pieces[:step])
     tip_frame, tip_velocities = chain_frame_and_jacobian(pieces)
     mid_frame[2, 3] += q[0]
     tip_frame[2, 3] += q[0]
-    direction = np.ascontiguousarray(tip_frame[:, 2])
     turning = tip_velocities.copy()
-    turning[:3] = 0.0
-    swing(turning, direction)
+    for row in range(3):
+        for column in range(6 * step):
+            turning[row, column] = 0.0
+    for piece in range(2 * step):
+        swing(turning, 3 * piece, (tip_frame[0, 2], tip_frame[1, 2], tip_frame[2, 2]))
     tip_jacobian, mid_jacobian = np.zeros((3, 7)), np.zeros((3, 7))
     direction_jacobian = np.zeros((3, 7))
     tip_jacobian[2, 0] = mid_jacobian[2, 0] = 1.0
@@ -114,7 +117,9 @@ def _kinematics(q: Array, parameters: Array) -> tuple[Array, Array, Array, Array
                 direction_jacobian[row, column] += (
                     turning[row, u] * proximal + turning[row, 3 * step + u] * distal
                 )
-    tip, mid = tip_frame[:, 3].copy(), mid_frame[:, 3].copy()
+    tip, mid, direction = np.empty(3), np.empty(3), np.empty(3)
+    for row in range(3):
+        tip[row], mid[row], direction[row] = tip_frame[row, 3], mid_frame[row, 3], tip_frame[row, 2]
     return tip, mid, direction, tip_jacobian, mid_jacobian, direction_jacobian
 
 
@@ -141,10 +146,13 @@ def _soft_segments(q: Array, parameters: Array) -> tuple[Array, Array]:
     soft, slope = np.empty((2, 3)), np.empty((6, 7))
     for k in range(2):
         soft[k, 2] = length - force[k] / stiffness
-        slope[3 * k + 2] = -force_slope[k] / stiffness
+        for column in range(7):
+            stretch_slope = -force_slope[k, column] / stiffness
+            slope[3 * k + 2, column] = stretch_slope
+            for axis in range(2):
+                slope[3 * k + axis, column] = (
+                    moment_slope[k, axis, column] * soft[k, 2] + moment[k, axis] * stretch_slope
+                ) / rigidity
         for axis in range(2):
             soft[k, axis] = moment[k, axis] * soft[k, 2] / rigidity
-            slope[3 * k + axis] = (
-                moment_slope[k, axis] * soft[k, 2] + moment[k, axis] * slope[3 * k + 2]
-            ) / rigidity
     return soft, slope

@@ -3,13 +3,27 @@
 The same arm as :class:`soro_lib.robots.HelixArm` (tested equal), on the compiled chain of
 `soro_lib.arc_kernels`: one call takes a few microseconds, which is what the state optimisation, the inner
 control loop and the elastic plant need. Frame `arm_base`, z down; lengths in m, angles in rad.
+
+Sums and products of arrays are plain loops: numba takes several times longer to compile array expressions
+and assignments to slices.
 """
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from soro_lib.arc_kernels import arc_numbers, carry_frame, chain_frame_and_jacobian, frame_velocities, swing
+from soro_lib.arc_kernels import (
+    arc_numbers,
+    arc_slopes,
+    base_frame,
+    carry,
+    carry_frame,
+    chain_frame_and_jacobian,
+    end_velocities,
+    frame_row,
+    frame_velocities,
+    swing,
+)
 
 Array = NDArray[np.float64]
 
@@ -23,12 +37,19 @@ def tip_points_and_jacobian(q: Array, gripper_length: float) -> tuple[Array, Arr
     Vervloet, Eqs. (4)-(7) and (12).
     """
     frame, wrist_jacobian = chain_frame_and_jacobian(q.reshape(SEGMENTS, 3))
-    gripper = gripper_length * frame[:, 2]
-    points = np.concatenate((frame[:, 3], frame[:, 3] + gripper))
+    gripper = (gripper_length * frame[0, 2], gripper_length * frame[1, 2], gripper_length * frame[2, 2])
+    points = np.empty(6)
     jacobian = np.empty((6, 3 * SEGMENTS))
-    jacobian[:3] = wrist_jacobian[:3]
-    swing(wrist_jacobian, gripper)
-    jacobian[3:] = wrist_jacobian[:3]
+    for k in range(3):
+        points[k] = frame[k, 3]
+        points[3 + k] = frame[k, 3] + gripper[k]
+        for column in range(3 * SEGMENTS):
+            jacobian[k, column] = wrist_jacobian[k, column]
+    for i in range(SEGMENTS):
+        swing(wrist_jacobian, 3 * i, gripper)
+    for k in range(3):
+        for column in range(3 * SEGMENTS):
+            jacobian[3 + k, column] = wrist_jacobian[k, column]
     return points, jacobian
 
 
@@ -51,10 +72,9 @@ def depth_moment(
     """
     total = 0.0
     gradient = np.zeros(3 * SEGMENTS)
-    frame = np.zeros((3, 4))
-    frame[0, 0] = frame[1, 1] = frame[2, 2] = 1.0
+    frame = base_frame()
+    velocities = np.empty((6, 3 * SEGMENTS))  # of each segment's end, by its own dx, dy and length
     ends = np.empty((SEGMENTS, 3))
-    velocities = np.empty((SEGMENTS, 6, 3))
     # All mass beyond the end of each segment, and its first moment in the base frame.
     beyond_mass = np.zeros(SEGMENTS)
     beyond_moment = np.zeros((SEGMENTS, 3))
@@ -64,24 +84,35 @@ def depth_moment(
         for j in range(masses_per_segment):
             share = (j + 0.5) / masses_per_segment
             piece = arc_numbers(share * dx, share * dy, share * length)
-            position = carry_frame(frame, piece)[:, 3]
-            total += mass * position[2]
-            gradient[3 * i : 3 * i + 3] += mass * share * frame_velocities(frame, piece)[2]
-            beyond_mass[:i] += mass
-            beyond_moment[:i] += mass * position
+            total += mass * carry(frame_row(frame, 2), piece)[3]
+            sinking = end_velocities(frame_row(frame, 2), piece, arc_slopes(piece))
+            gradient[3 * i] += mass * share * sinking[0]
+            gradient[3 * i + 1] += mass * share * sinking[1]
+            gradient[3 * i + 2] += mass * share * sinking[2]
+            for before in range(i):
+                beyond_mass[before] += mass
+                for k in range(3):
+                    beyond_moment[before, k] += mass * carry(frame_row(frame, k), piece)[3]
         arc = arc_numbers(dx, dy, length)
-        velocities[i] = frame_velocities(frame, arc)
-        frame = carry_frame(frame, arc)
-        ends[i] = frame[:, 3]
-    tip = frame[:, 3] + tip_distance * frame[:, 2]
-    total += tip_mass * tip[2]
-    beyond_mass += tip_mass
-    beyond_moment += tip_mass * tip
+        frame_velocities(frame, arc, velocities, 3 * i)
+        carry_frame(frame, arc)
+        for k in range(3):
+            ends[i, k] = frame[k, 3]
+    total += tip_mass * (frame[2, 3] + tip_distance * frame[2, 2])
     for i in range(SEGMENTS):
-        moment_change = velocities[i]
-        moment_change[:3] *= beyond_mass[i]
-        swing(moment_change, beyond_moment[i] - beyond_mass[i] * ends[i])
-        gradient[3 * i : 3 * i + 3] += moment_change[2]
+        beyond_mass[i] += tip_mass
+        for k in range(3):
+            beyond_moment[i, k] += tip_mass * (frame[k, 3] + tip_distance * frame[k, 2])
+            for column in range(3 * i, 3 * i + 3):
+                velocities[k, column] *= beyond_mass[i]
+        lever = (
+            beyond_moment[i, 0] - beyond_mass[i] * ends[i, 0],
+            beyond_moment[i, 1] - beyond_mass[i] * ends[i, 1],
+            beyond_moment[i, 2] - beyond_mass[i] * ends[i, 2],
+        )
+        swing(velocities, 3 * i, lever)
+    for column in range(3 * SEGMENTS):
+        gradient[column] += velocities[2, column]
     return total, gradient
 
 
@@ -122,6 +153,26 @@ def cholesky_solve(factor: Array, vector: Array) -> Array:
 
 
 @njit(cache=True)
+def dot(first: Array, second: Array) -> float:
+    """Return the scalar product of two vectors, summed in order."""
+    total = 0.0
+    for i in range(first.shape[0]):
+        total += first[i] * second[i]
+    return total
+
+
+@njit(cache=True)
+def largest(vector: Array) -> float:
+    """Return the largest magnitude of the entries of a vector, NaN if one of them is."""
+    most = 0.0
+    for i in range(vector.shape[0]):
+        magnitude = abs(vector[i])
+        if magnitude > most or np.isnan(magnitude):
+            most = magnitude
+    return most
+
+
+@njit(cache=True)
 def multiply(matrix: Array, vector: Array) -> Array:
     """Return matrix @ vector; plain loops beat BLAS at these sizes."""
     product = np.zeros(matrix.shape[0])
@@ -152,4 +203,7 @@ def unreachable_direction(points: Array) -> Array:
     for k in range(3):
         normal[3 + k] = points[3 + k] - points[k]
         normal[k] = -normal[3 + k]
-    return normal / np.sqrt((normal**2).sum())
+    length = np.sqrt(dot(normal, normal))
+    for k in range(6):
+        normal[k] /= length
+    return normal

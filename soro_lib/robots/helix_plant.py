@@ -24,6 +24,8 @@ from soro_lib.robots.helix_kernels import (
     cholesky,
     cholesky_solve,
     depth_moment,
+    dot,
+    largest,
     multiply,
     tip_points_and_jacobian,
 )
@@ -169,14 +171,35 @@ def held_state(free: Array, stiffness: Array, held: Array, grip: float, gripper_
     """Return the state of least ``(q - free)' K (q - free) + grip |f(q) - held|^2``, by Gauss-Newton."""
     q = free.copy()
     for _ in range(50):
-        points, jacobian = tip_points_and_jacobian(q, gripper_length)
-        gradient = stiffness * (q - free) + grip * multiply(jacobian.T, points - held)
-        hessian = np.diag(stiffness) + grip * jacobian.T @ jacobian
-        step = -cholesky_solve(cholesky(hessian), gradient)
-        q = q + min(1.0, LONGEST_NEWTON_STEP / np.abs(step).max()) * step
-        if np.abs(step).max() < EQUILIBRIUM_TOLERANCE:
+        gradient, hessian = np.empty(9), np.zeros((9, 9))
+        for i in range(9):
+            gradient[i] = stiffness[i] * (q[i] - free[i])
+            hessian[i, i] = stiffness[i]
+        add_grip(gradient, hessian, q, held, grip, gripper_length)
+        step = cholesky_solve(cholesky(hessian), gradient)
+        longest = largest(step)
+        share = min(1.0, LONGEST_NEWTON_STEP / longest)
+        for i in range(9):
+            q[i] -= share * step[i]
+        if longest < EQUILIBRIUM_TOLERANCE:
             break
     return q
+
+
+@njit(cache=True)
+def add_grip(
+    gradient: Array, hessian: Array, q: Array, held: Array, grip: float, gripper_length: float
+) -> None:
+    """Add the slopes of ``grip |f(q) - held|^2 / 2`` to a gradient (9,) and a Hessian (9, 9), in place."""
+    points, jacobian = tip_points_and_jacobian(q, gripper_length)
+    for k in range(6):
+        points[k] -= held[k]
+    pull = multiply(jacobian.T, points)
+    curvature = grip * jacobian.T @ jacobian
+    for i in range(9):
+        gradient[i] += grip * pull[i]
+        for j in range(9):
+            hessian[i, j] += curvature[i, j]
 
 
 @dataclass
@@ -283,68 +306,111 @@ class LoadedArm(NamedTuple):
     gripper_length: float
 
 
+SCALE = np.array([1.0, 1.0, 0.1] * 3)
+"""What the search counts each coordinate of q in: radians and 0.1 m."""
+
+
 @njit(cache=True)
 def equilibrium(q: Array, arm: LoadedArm) -> tuple[Array, bool]:
     """Return the state of least energy near q and whether the search came to rest (damped Newton)."""
-    scale = np.array([1.0, 1.0, 0.1] * 3)
     energy = potential_energy(q, arm)
     for _ in range(1000):
-        gradient, hessian = energy_slopes(q, arm)
-        scaled_hessian = hessian * np.outer(scale, scale)
-        shift = 0.0
-        factor = cholesky(scaled_hessian)
-        while np.isnan(factor[0, 0]):
-            shift = max(2 * shift, 1e-3 * np.abs(np.diag(scaled_hessian)).max())
-            factor = cholesky(scaled_hessian + shift * np.eye(9))
-        step = -cholesky_solve(factor, scale * gradient)
-        length = np.sqrt((step**2).sum())
+        step = newton_step(q, arm)
+        length = np.sqrt(dot(step, step))
         if length < EQUILIBRIUM_TOLERANCE:
             return q, True
         share = min(1.0, LONGEST_NEWTON_STEP / length)
-        new_energy = potential_energy(q + share * scale * step, arm)
+        moved = stepped(q, share, step)
+        new_energy = potential_energy(moved, arm)
         while new_energy > energy + ENERGY_ROUNDING and share * length > EQUILIBRIUM_TOLERANCE:
             share /= 2
-            new_energy = potential_energy(q + share * scale * step, arm)
-        q = q + share * scale * step
+            moved = stepped(q, share, step)
+            new_energy = potential_energy(moved, arm)
+        q = moved
         energy = new_energy
     return q, length < 1e3 * EQUILIBRIUM_TOLERANCE
 
 
 @njit(cache=True)
+def newton_step(q: Array, arm: LoadedArm) -> Array:
+    """Return the downhill Newton step (9,), in units of `SCALE`; damped where the energy is not convex."""
+    gradient, hessian = energy_slopes(q, arm)
+    steepest = 0.0
+    for i in range(9):
+        gradient[i] *= -SCALE[i]
+        for j in range(9):
+            hessian[i, j] *= SCALE[i] * SCALE[j]
+        steepest = max(steepest, abs(hessian[i, i]))
+    shift = 0.0
+    factor = cholesky(hessian)
+    while np.isnan(factor[0, 0]):
+        shift = max(2 * shift, 1e-3 * steepest)
+        damped = hessian.copy()
+        for i in range(9):
+            damped[i, i] += shift
+        factor = cholesky(damped)
+    return cholesky_solve(factor, gradient)
+
+
+@njit(cache=True)
+def stepped(q: Array, share: float, step: Array) -> Array:
+    """Return the state (9,) after a share of a step in units of `SCALE`."""
+    moved = np.empty(9)
+    for i in range(9):
+        moved[i] = q[i] + share * SCALE[i] * step[i]
+    return moved
+
+
+@njit(cache=True)
 def potential_energy(q: Array, arm: LoadedArm) -> float:
     """Return the energy [J] of gravity, bending, stretching, tendons and holding hand."""
-    stretch = np.maximum(multiply(arm.tendon_map, q) - arm.tendons, 0.0)
+    lengths = multiply(arm.tendon_map, q)
+    elastic, pulled = 0.0, 0.0
+    for i in range(9):
+        strain, stretch = q[i] - arm.free[i], max(lengths[i] - arm.tendons[i], 0.0)
+        elastic += arm.stiffness[i] * (strain * strain)
+        pulled += stretch * stretch
     moment, _ = depth_moment(q, arm.masses, LUMPS, arm.tip_mass, arm.tip_distance)
-    energy = 0.5 * (arm.stiffness * (q - arm.free) ** 2).sum() - GRAVITY * moment
-    energy += 0.5 * arm.tendon_stiffness * (stretch**2).sum()
+    energy = 0.5 * elastic - GRAVITY * moment
+    energy += 0.5 * arm.tendon_stiffness * pulled
     if arm.grip > 0:
         points, _ = tip_points_and_jacobian(q, arm.gripper_length)
-        energy += 0.5 * arm.grip * ((points - arm.held) ** 2).sum()
+        for k in range(6):
+            points[k] -= arm.held[k]
+        energy += 0.5 * arm.grip * dot(points, points)
     return energy
 
 
 @njit(cache=True)
 def energy_slopes(q: Array, arm: LoadedArm) -> tuple[Array, Array]:
     """Return gradient (9,) and Hessian (9, 9) of `potential_energy`; gravity's curvature by differences."""
-    gradient = arm.stiffness * (q - arm.free)
-    hessian = np.diag(arm.stiffness)
-    stretch = multiply(arm.tendon_map, q) - arm.tendons
-    for k in range(9):
-        if stretch[k] > 0:
-            gradient += arm.tendon_stiffness * stretch[k] * arm.tendon_map[k]
-            hessian += arm.tendon_stiffness * np.outer(arm.tendon_map[k], arm.tendon_map[k])
+    lengths = multiply(arm.tendon_map, q)
     _, fall = depth_moment(q, arm.masses, LUMPS, arm.tip_mass, arm.tip_distance)
-    gradient -= GRAVITY * fall
+    gradient, hessian = np.empty(9), np.zeros((9, 9))
+    for i in range(9):
+        gradient[i] = arm.stiffness[i] * (q[i] - arm.free[i])
+        hessian[i, i] = arm.stiffness[i]
+    for k in range(9):
+        stretch = lengths[k] - arm.tendons[k]
+        if stretch > 0:
+            for i in range(9):
+                gradient[i] += arm.tendon_stiffness * stretch * arm.tendon_map[k, i]
+                for j in range(9):
+                    hessian[i, j] += arm.tendon_stiffness * (arm.tendon_map[k, i] * arm.tendon_map[k, j])
+    nudge = 1e-7
     for j in range(9):
-        nudge = np.zeros(9)
-        nudge[j] = 1e-7
-        _, ahead = depth_moment(q + nudge, arm.masses, LUMPS, arm.tip_mass, arm.tip_distance)
-        hessian[:, j] -= GRAVITY * (ahead - fall) / nudge[j]
+        nudged = q.copy()
+        nudged[j] += nudge
+        _, ahead = depth_moment(nudged, arm.masses, LUMPS, arm.tip_mass, arm.tip_distance)
+        gradient[j] -= GRAVITY * fall[j]
+        for i in range(9):
+            hessian[i, j] -= GRAVITY * (ahead[i] - fall[i]) / nudge
     if arm.grip > 0:
-        points, jacobian = tip_points_and_jacobian(q, arm.gripper_length)
-        gradient += arm.grip * multiply(jacobian.T, points - arm.held)
-        hessian += arm.grip * jacobian.T @ jacobian
-    return gradient, 0.5 * (hessian + hessian.T)
+        add_grip(gradient, hessian, q, arm.held, arm.grip, arm.gripper_length)
+    for i in range(9):
+        for j in range(i):
+            hessian[i, j] = hessian[j, i] = 0.5 * (hessian[i, j] + hessian[j, i])
+    return gradient, hessian
 
 
 @dataclass

@@ -10,6 +10,7 @@ from soro_lib.robots.helix_kernels import (
     cholesky,
     cholesky_solve,
     depth_moment,
+    largest,
     tip_points_and_jacobian,
     unreachable_direction,
 )
@@ -62,3 +63,8 @@ def test_cholesky_solves(root, vector):
 
 def test_cholesky_says_when_a_matrix_is_not_positive_definite():
     assert np.isnan(cholesky(np.diag([1.0, -1.0, 1.0]))[0, 0])
+
+
+def test_largest_magnitude_hides_no_nan():
+    assert largest(np.array([1.0, -3.0, 2.0])) == 3.0
+    assert np.isnan(largest(np.array([1.0, np.nan, 2.0])))
