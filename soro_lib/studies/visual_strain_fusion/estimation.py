@@ -22,6 +22,16 @@ LABEL_NOISE = (0.38e-3, 0.45e-3, 0.29e-3)
 """Standard deviation of camera labels along x, y, z where no recording is used [m]."""
 INITIAL_SAMPLES = 450
 
+ROUNDING_LIMIT = 1e10
+"""Condition number, or trace of H, of which rounding leaves about six digits: 1e10 times 2e-16 [-].
+
+Beyond it the number, and what a network learns with it, differs visibly from processor to processor.
+"""
+DIVERGED = 1.0
+"""Largest position error of a network that has not diverged [m]: many times the reach of the arm."""
+UNRESOLVED_DIGITS = 3
+"""Digits of an error that are the same on every processor though the trace passed `ROUNDING_LIMIT`."""
+
 NETWORKS: dict[str, dict[str, Any]] = {
     "default": {},
     "no forgetting": {"forgetting": 1.0},
@@ -60,6 +70,16 @@ class LearningRun:
     posterior_to_label: Array
     trace: Array
     condition: float
+
+    @property
+    def resolved(self) -> NDArray[np.bool_]:
+        """Steps ``(n,)`` before the trace passes `ROUNDING_LIMIT` or H loses its positive definiteness."""
+        return np.logical_and.accumulate((self.trace > 0.0) & (self.trace < ROUNDING_LIMIT))
+
+    @property
+    def diverged(self) -> bool:
+        """Whether the distance from the true position ever exceeds `DIVERGED`."""
+        return not self.prior.max() <= DIVERGED
 
 
 def noisy_labels(motion: ArmMotion, rng: np.random.Generator, noise: Sequence[float] = LABEL_NOISE) -> Array:
@@ -141,7 +161,8 @@ def compare_networks(
     -------
     pandas.DataFrame
         Columns network, seed, prior_mean_mm, prior_max_mm (to the truth), prior_label_mm, posterior_label_mm
-        (to the labels), their components ``prior_x_mm`` ..., trace, condition.
+        (to the labels), their components ``prior_x_mm`` ..., trace, condition. What rounding decides is
+        infinite: errors of a network that diverged, a trace or condition beyond `ROUNDING_LIMIT`.
     """
     motion = spiral(steps)
     rows = []
@@ -158,23 +179,56 @@ def compare_networks(
 
 
 def _errors(run: LearningRun) -> dict[str, float]:
-    axes = dict(zip("xyz", range(3)))
-    return {
-        "prior_mean_mm": 1e3 * float(run.prior.mean()),
-        "prior_max_mm": 1e3 * float(run.prior.max()),
-        "prior_label_mm": 1e3 * float(np.linalg.norm(run.prior_to_label, axis=1).mean()),
-        "posterior_label_mm": 1e3 * float(np.linalg.norm(run.posterior_to_label, axis=1).mean()),
-        **{
-            f"prior_{axis}_mm": 1e3 * float(np.abs(run.prior_to_label[:, n]).mean())
-            for axis, n in axes.items()
-        },
-        **{
-            f"posterior_{axis}_mm": 1e3 * float(np.abs(run.posterior_to_label[:, n]).mean())
-            for axis, n in axes.items()
-        },
-        "trace": float(run.trace[-1]),
-        "condition": run.condition,
+    errors = {
+        "prior_mean": run.prior.mean(),
+        "prior_max": run.prior.max(),
+        "prior_label": np.linalg.norm(run.prior_to_label, axis=1).mean(),
+        "posterior_label": np.linalg.norm(run.posterior_to_label, axis=1).mean(),
+        **{f"prior_{axis}": np.abs(run.prior_to_label[:, n]).mean() for n, axis in enumerate("xyz")},
+        **{f"posterior_{axis}": np.abs(run.posterior_to_label[:, n]).mean() for n, axis in enumerate("xyz")},
     }
+    resolved = bool(run.resolved.all())
+    return {
+        **{f"{name}_mm": _steady(1e3 * float(error), run, resolved) for name, error in errors.items()},
+        "trace": float(run.trace[-1]) if resolved else np.inf,
+        "condition": run.condition if run.condition < ROUNDING_LIMIT else np.inf,
+    }
+
+
+def _steady(error: float, run: LearningRun, resolved: bool) -> float:
+    """Return what every processor agrees on of an error: all of it, its first digits, or that it is large."""
+    if run.diverged:
+        return np.inf
+    return error if resolved else float(f"{error:.{UNRESOLVED_DIGITS}g}")
+
+
+SETTINGS_COLUMNS = (
+    "prior_mean_mm",
+    "prior_max_mm",
+    "prior_label_mm",
+    "posterior_label_mm",
+    "trace",
+    "condition",
+)
+
+
+def settings_table(networks: pd.DataFrame) -> pd.DataFrame:
+    """Means over the seeds of `compare_networks`, as text: six digits, or words for what rounding decides.
+
+    "diverged" is an error beyond `DIVERGED`, "beyond 1e+10" a trace or a condition beyond
+    `ROUNDING_LIMIT`; a network whose trace is beyond it has `UNRESOLVED_DIGITS` digits of its errors.
+    """
+    means = networks.groupby("network", sort=False)[list(SETTINGS_COLUMNS)].mean()
+    digits = np.where(np.isfinite(means["trace"]), 6, UNRESOLVED_DIGITS)
+    words = {"trace": f"beyond {ROUNDING_LIMIT:.0e}", "condition": f"beyond {ROUNDING_LIMIT:.0e}"}
+    text = {
+        column: [
+            f"{value:.{count}g}" if np.isfinite(value) else words.get(column, "diverged")
+            for value, count in zip(means[column], digits)
+        ]
+        for column in SETTINGS_COLUMNS
+    }
+    return pd.DataFrame(text, index=means.index).reset_index()
 
 
 def window_errors(
@@ -219,8 +273,13 @@ HOLD_NETWORKS: dict[str, dict[str, Any]] = {
 }
 
 
+HOLD_START = 900
+"""Step of the spiral at which `hold_still` stops: the network has followed its labels for 450 steps."""
+HOLD_STEPS = 2000
+
+
 def hold_still(
-    seed: int, *, hold_steps: int = 1200, networks: Mapping[str, Mapping[str, Any]] = HOLD_NETWORKS
+    seed: int, *, hold_steps: int = HOLD_STEPS, networks: Mapping[str, Mapping[str, Any]] = HOLD_NETWORKS
 ) -> dict[str, LearningRun]:
     """Follow the spiral, stand still, then go on: forgetting with narrow excitation.
 
@@ -228,10 +287,8 @@ def hold_still(
     covariance of those directions grows exponentially unless it is bounded.
     """
     bending = spiral_bending(3000)
-    bending = np.concatenate(
-        [bending[:1800], np.repeat(bending[1800:1801], hold_steps, axis=0), bending[1800:]]
-    )
-    motion = move(bending)
+    pause = np.repeat(bending[HOLD_START : HOLD_START + 1], hold_steps, axis=0)
+    motion = move(np.concatenate([bending[:HOLD_START], pause, bending[HOLD_START:]]))
     rng = np.random.default_rng(seed)
     shifts = read_fibre(glue_fibre(rng), motion, rng)
     labels = noisy_labels(motion, rng)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,8 +12,10 @@ from matplotlib.figure import Figure
 from soro_lib.reporting.plotting import COLORS, PAGE_WIDTH, SERIES, label_axes, legend, new_figure
 from soro_lib.robots.pneumatic_plant import BackboneParameters
 from soro_lib.sensing.fibre import FibreGratings
-from soro_lib.studies.visual_strain_fusion.estimation import LearningRun
+from soro_lib.studies.visual_strain_fusion.estimation import DIVERGED, ROUNDING_LIMIT, LearningRun
 from soro_lib.studies.visual_strain_fusion.motion import PERIOD
+
+DIVERGED_COLOR = "#b00000"
 
 
 def fig03_strain_along_the_helix(fibre: FibreGratings) -> Figure:
@@ -40,44 +43,54 @@ def elm_before_and_after(table: pd.DataFrame) -> Figure:
     figure, axes = new_figure(PAGE_WIDTH, 3.4)
     groups = table.groupby("network", sort=False)
     rows = np.arange(len(groups))
+    diverged = np.isinf(groups["prior_mean_mm"].max().to_numpy())
     styles = {
         "prior_mean_mm": ("to the truth, before learning", COLORS["black"], "s"),
         "prior_label_mm": ("to the label, before learning", COLORS["blue"], "o"),
         "posterior_label_mm": ("to the label, after learning it", COLORS["orange"], "v"),
     }
     for column, (label, color, marker) in styles.items():
-        mean, low, high = (getattr(groups[column], how)() for how in ("mean", "min", "max"))
+        mean, low, high = (getattr(groups[column], how)().mask(diverged) for how in ("mean", "min", "max"))
         spread = np.stack([mean - low, high - mean])
-        blown = mean.to_numpy() > 10.0
-        if blown.any():
-            mean, spread = mean.mask(blown), np.where(blown, np.nan, spread)
         axes.errorbar(mean, rows, xerr=spread, linestyle="none", color=color, marker=marker, label=label)
     axes.set_yticks(rows, labels=list(groups.groups))
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.3)
-    for row, (_, group) in zip(rows, groups):
-        if group.prior_mean_mm.mean() > 10.0:
-            axes.text(
-                0.02, row, f"blown up: {group.prior_mean_mm.mean():.0e} mm", va="center", color="#b00000"
-            )
+    for row in rows[diverged]:
+        axes.text(0.02, row, f"diverged: errors beyond {DIVERGED:g} m", va="center", color=DIVERGED_COLOR)
     label_axes(axes, "mean spatial error [mm]")
     legend(figure)
     return figure
 
 
 def elm_blow_up(runs: Mapping[str, LearningRun], hold: tuple[int, int]) -> Figure:
-    """Draw covariance and error while the arm stands still and after: forgetting with narrow excitation."""
+    """Draw covariance and error while the arm stands still and after: forgetting with narrow excitation.
+
+    A line ends where rounding takes over, because it would go on differently on every processor.
+    """
     figure, axes = new_figure(PAGE_WIDTH, 3.8, rows=2, sharex=True)
+    second = round(1.0 / PERIOD)
+    limit = f"beyond $10^{{{math.log10(ROUNDING_LIMIT):.0f}}}$ rounding decides"
     for color, (name, run) in zip((COLORS["vermillion"], COLORS["blue"], COLORS["black"]), runs.items()):
-        time = PERIOD * run.step
-        axes[0].plot(time, run.trace, color=color, label=name)
-        axes[1].plot(time, 1e3 * run.prior, color=color, linewidth=0.8)
+        seconds = np.count_nonzero(run.resolved) // second
+        steps = slice(0, seconds * second)
+        time, trace = PERIOD * run.step[steps], run.trace[steps]
+        error = 1e3 * run.prior[steps].reshape(seconds, second).mean(axis=1)
+        axes[0].plot(time, trace, color=color, label=name)
+        axes[1].plot(time[second - 1 :: second], error, color=color)
+        if not run.resolved.all():
+            fate = f"then diverges, errors beyond {DIVERGED:g} m" if run.diverged else limit
+            for panel, value, height, word in zip(axes, (trace[-1], error[-1]), (1e11, 4.0), (limit, fate)):
+                panel.plot(time[-1], value, "x", color=DIVERGED_COLOR, markeredgewidth=2, zorder=5)
+                panel.plot([time[-1]] * 2, [value, height], ":", color=DIVERGED_COLOR, zorder=5)
+                panel.text(time[-1] + 1.0, height, word, color=DIVERGED_COLOR, va="center")
     for panel in axes:
         panel.set_yscale("log")
         panel.axvspan(PERIOD * hold[0], PERIOD * hold[1], color=COLORS["light"], alpha=0.5, zorder=0)
-    axes[1].set_ylim(1e-2, 1e9)
+    axes[0].set_ylim(1e6, 1e12)
+    axes[1].set_ylim(1e-1, 1e1)
     label_axes(axes[0], y="trace of H [-]", title="Standing still (grey)")
-    label_axes(axes[1], "time [s]", "error before learning [mm]")
+    label_axes(axes[1], "time [s]", "error before learning,\nmean of 1 s [mm]")
     legend(axes[0])
     return figure
 
