@@ -75,12 +75,14 @@ def blend_poses(camera_pose: ArrayLike, fibre_pose: ArrayLike, weight: ArrayLike
         if pose.ndim == 0 or pose.shape[-1] != 7:
             raise ValueError(f"{name} must be (..., 7), got {pose.shape}")
     has_camera, has_fibre = np.isfinite(camera).all(axis=-1), np.isfinite(fibre).all(axis=-1)
-    if not (has_camera | has_fibre).all():
-        raise ValueError("neither the camera's nor the fibre's pose is finite")
-    weight = np.where(has_camera, np.where(has_fibre, weight, 0.0), 1.0)[..., None]
-    camera = np.where(has_camera[..., None], camera, fibre)
-    fibre = same_hemisphere(np.where(has_fibre[..., None], fibre, camera), camera)
-    fused = weight * fibre + (1.0 - weight) * camera
+    if not (has_camera & has_fibre).all():
+        if not (has_camera | has_fibre).all():
+            raise ValueError("neither the camera's nor the fibre's pose is finite")
+        weight = np.where(has_camera, np.where(has_fibre, weight, 0.0), 1.0)
+        camera = np.where(has_camera[..., None], camera, fibre)
+        fibre = np.where(has_fibre[..., None], fibre, camera)
+    share = np.asarray(weight, dtype=float)[..., None]
+    fused = share * same_hemisphere(fibre, camera) + (1.0 - share) * camera
     fused[..., 3:] = unit_quaternion(fused[..., 3:])
     return fused
 
