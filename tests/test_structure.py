@@ -22,6 +22,7 @@ FLOORS = {
     "soro_lib.arcs": 0,
     "soro_lib.arc_kernels": 0,
     "soro_lib.poses": 0,
+    "soro_lib.jit": 0,
     "soro_lib.paths": 0,
     "soro_lib.datacards": 0,
     "soro_lib.robots": 1,

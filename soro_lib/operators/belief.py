@@ -4,8 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 
+from soro_lib.jit import inlined
 from soro_lib.operators.people import Operator, Vector
 
 BELIEF_CORRELATION = 0.6
@@ -22,7 +22,7 @@ class Belief(NamedTuple):
     shift: Vector
 
 
-@register_jitable(forceinline=True)
+@inlined
 def new_belief(rule: Operator, old: Belief, rng: np.random.Generator) -> Belief:
     """Fresh look at a new goal; the depth error is correlated with that of the last one."""
     fresh = math.sqrt(1.0 - BELIEF_CORRELATION**2) * rule.depth_error
@@ -36,7 +36,7 @@ def new_belief(rule: Operator, old: Belief, rng: np.random.Generator) -> Belief:
     )
 
 
-@register_jitable(forceinline=True)
+@inlined
 def scaled_belief(belief: Belief, factor: float) -> Belief:
     """The belief after a failed grasp: part of the error is gone."""
     return Belief(
@@ -44,7 +44,7 @@ def scaled_belief(belief: Belief, factor: float) -> Belief:
     )
 
 
-@register_jitable(forceinline=True)
+@inlined
 def belief_error(rule: Operator, belief: Belief, automation: Vector) -> Vector:
     """Error of the believed goal [m].
 

@@ -2,8 +2,7 @@
 
 from typing import NamedTuple
 
-from numba.extending import register_jitable
-
+from soro_lib.jit import inlined
 from soro_lib.operators.people import SAMPLE_TIME, Operator
 
 ATTACH_PATIENCE = 1.0
@@ -25,7 +24,7 @@ NOT_PRESSING = -1.0
 DECIDED_NOTHING = Decision(False, 0.0, NOT_PRESSING, 0.0, 0.0, False)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def decide(rule: Operator, decision: Decision, looks_right: bool, pulled: bool, held: bool) -> Decision:
     """Press once the tip has looked right long enough; give a grasp up that caught nothing; report an item.
 

@@ -4,8 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 
+from soro_lib.jit import inlined
 from soro_lib.operators.people import DEVICE_SCALE, SAMPLE_TIME, Operator, Vector
 
 HAND_STEPS = 4
@@ -37,14 +37,14 @@ class Hand(NamedTuple):
     drift: Vector
 
 
-@register_jitable(forceinline=True)
+@inlined
 def minimum_jerk(share: float) -> float:
     """Position along a minimum-jerk movement, 0 to 1, at a share of its duration (Flash and Hogan 1985)."""
     s = min(max(share, 0.0), 1.0)
     return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def plan_submovement(
     rule: Operator, movement: Movement, error: Vector, time: float, rng: np.random.Generator
 ) -> Movement:
@@ -65,7 +65,7 @@ def plan_submovement(
     return Movement(change, time, duration, movement.intention)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def intend(rule: Operator, movement: Movement, hand: Hand, time: float) -> Movement:
     """Advance the intended position along the submovement; a yielding operator lets it drift to the hand."""
     now = minimum_jerk((time - movement.start) / movement.duration)
@@ -85,7 +85,7 @@ def intend(rule: Operator, movement: Movement, hand: Hand, time: float) -> Movem
     return Movement(movement.change, movement.start, movement.duration, intention)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def felt_force(force: Vector, friction: float) -> Vector:
     """What the device's friction leaves of a guidance force [N]."""
     size = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
@@ -93,7 +93,7 @@ def felt_force(force: Vector, friction: float) -> Vector:
     return (share * force[0], share * force[1], share * force[2])
 
 
-@register_jitable(forceinline=True)
+@inlined
 def pull_axis(rule: Operator, position: float, velocity: float, aim: float, force: float) -> Vector:
     """One period of the hand's mass, damper and spring along one axis: position, velocity, 0."""
     step = SAMPLE_TIME / HAND_STEPS
@@ -105,7 +105,7 @@ def pull_axis(rule: Operator, position: float, velocity: float, aim: float, forc
     return (position, velocity, 0.0)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def hand_step(
     rule: Operator, hand: Hand, intention: Vector, force: Vector, time: float, rng: np.random.Generator
 ) -> Hand:
@@ -125,7 +125,7 @@ def hand_step(
     return Hand((x[0], y[0], z[0]), (x[1], y[1], z[1]), drift)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def hand_command(hand: Hand) -> Vector:
     """Position commanded by the device [m]."""
     return (

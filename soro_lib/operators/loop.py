@@ -4,9 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from soro_lib.jit import inlined
 from soro_lib.operators.belief import Belief, belief_error, new_belief, scaled_belief
 from soro_lib.operators.decision import DECIDED_NOTHING, Decision, decide
 from soro_lib.operators.hand import Hand, Movement, hand_step, intend, plan_submovement
@@ -71,7 +71,7 @@ def picture_buffer(rule: Operator, tip: Vector) -> NDArray[np.float64]:
     return np.tile(np.asarray(tip, dtype=float), (max(round(rule.reaction_delay / SAMPLE_TIME), 1), 1))
 
 
-@register_jitable(forceinline=True)
+@inlined
 def delayed_picture(pictures: NDArray[np.float64], sample: int, tip: Vector) -> tuple[Vector, float]:
     """The tip one reaction delay ago [m] and its speed then [m/s]; the new picture is stored."""
     count = len(pictures)
@@ -88,7 +88,7 @@ def delayed_picture(pictures: NDArray[np.float64], sample: int, tip: Vector) -> 
     return seen, speed
 
 
-@register_jitable(forceinline=True)
+@inlined
 def heed_force(rule: Operator, belief: Belief, force: Vector, size: float) -> Belief:
     """Take a felt force for a hint and move the belief along it."""
     step = rule.cue_gain * SAMPLE_TIME
@@ -102,7 +102,7 @@ def heed_force(rule: Operator, belief: Belief, force: Vector, size: float) -> Be
     return Belief(belief.right, belief.up, belief.depth, belief.glance, shift)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def approach_rise(rule: Operator, goal: Vector, seen: Vector) -> float:
     """How much higher to aim while the tip is horizontally far from the goal [m]."""
     across = math.sqrt((goal[0] - seen[0]) ** 2 + (goal[1] - seen[1]) ** 2)
@@ -110,13 +110,13 @@ def approach_rise(rule: Operator, goal: Vector, seen: Vector) -> float:
     return rule.approach_height * min(max(share, 0.0), 1.0)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def distance(a: Vector, b: Vector) -> float:
     """Euclidean distance of two points."""
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def believed_goal(rule: Operator, belief: Belief, view: View) -> Vector:
     """Where the operator takes the goal to be [m]."""
     wrong, shift, machine = belief_error(rule, belief, view.automation), belief.shift, view.automation
@@ -127,7 +127,7 @@ def believed_goal(rule: Operator, belief: Belief, view: View) -> Vector:
     )
 
 
-@register_jitable(forceinline=True)
+@inlined
 def seen_error(rule: Operator, view: View, goal: Vector, seen: Vector) -> Vector:
     """What is left to steer [m]: from where the tip is expected to settle to the goal, approached from above.
 
@@ -142,7 +142,7 @@ def seen_error(rule: Operator, view: View, goal: Vector, seen: Vector) -> Vector
     )
 
 
-@register_jitable(forceinline=True)
+@inlined
 def operator_step(
     rule: Operator,
     state: OperatorState,

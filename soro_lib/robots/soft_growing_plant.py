@@ -12,9 +12,9 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.jit import inlined
 from soro_lib.robots.soft_growing import (
     eversion_length,
     eversion_proxy,
@@ -218,7 +218,7 @@ def control_error(
     return steering / length, float(eversion_length(aim)) - length
 
 
-@register_jitable(forceinline=True)
+@inlined
 def simulated_tip(tip: Vector, desired: Vector, lag: float) -> Vector:
     """One period of the simulator's first-order tip, exact for the authors' step of 1 % per 10 ms."""
     share = SAMPLE_TIME / (lag + SAMPLE_TIME)
@@ -229,19 +229,19 @@ def simulated_tip(tip: Vector, desired: Vector, lag: float) -> Vector:
     )
 
 
-@register_jitable(forceinline=True)
+@inlined
 def eversion_command(gain: float, feed_forward: float, length_error: float) -> float:
     """Commanded growth rate [m/s]: proportional, less what counters the passive growth (supplement, 5)."""
     return gain * length_error - feed_forward
 
 
-@register_jitable(forceinline=True)
+@inlined
 def steering_command(gain: float, damping: float, length: float, error: float, error_rate: float) -> float:
     """Commanded steering rate [1/s]: proportional-derivative, scaled with the length (supplement, 5)."""
     return length / REFERENCE_LENGTH * (gain * error + damping * error_rate)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def limited(x: float, y: float, bound: float) -> tuple[float, float]:
     """The vector (x, y), shortened to the bound where it is longer."""
     size = math.sqrt(x * x + y * y)
@@ -249,7 +249,7 @@ def limited(x: float, y: float, bound: float) -> tuple[float, float]:
     return scale * x, scale * y
 
 
-@register_jitable(forceinline=True)
+@inlined
 def after_friction(x: float, y: float, friction: float) -> tuple[float, float]:
     """What Coulomb friction leaves of the command (x, y): nothing below it, the excess above."""
     size = math.sqrt(x * x + y * y)
@@ -257,7 +257,7 @@ def after_friction(x: float, y: float, friction: float) -> tuple[float, float]:
     return scale * x, scale * y
 
 
-@register_jitable(forceinline=True)
+@inlined
 def real_tip(rule: PlantRule, state: PlantState, desired: Vector) -> PlantState:
     """One period of the real arm: steer toward the proxy, evert the rest (supplement, Sections 4 and 5).
 
@@ -296,7 +296,7 @@ def real_tip(rule: PlantRule, state: PlantState, desired: Vector) -> PlantState:
     return PlantState(tip, x, y, rate_x, rate_y, error_x, error_y, length, growth, state.sample + 1)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def plant_step(
     rule: PlantRule, state: PlantState, delayed: NDArray[np.float64], desired: Vector
 ) -> PlantState:
@@ -311,7 +311,7 @@ def plant_step(
     return real_tip(rule, state, arriving)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def tracked_tip(tip: Vector, noise: float, rng: np.random.Generator) -> Vector:
     """The tip as motion capture reports it (Stroppa et al., Section 3.3.1)."""
     if noise == 0.0:
@@ -408,7 +408,7 @@ class GripperState(NamedTuple):
     letting_go: float
 
 
-@register_jitable(forceinline=True)
+@inlined
 def nearest_item(items: NDArray[np.float64], point: Vector) -> tuple[int, float]:
     """Number of the nearest item and its distance [m]."""
     best, least = NOTHING, math.inf
@@ -420,7 +420,7 @@ def nearest_item(items: NDArray[np.float64], point: Vector) -> tuple[int, float]
     return best, least
 
 
-@register_jitable(forceinline=True)
+@inlined
 def gripper_step(
     rule: GripperRule,
     state: GripperState,

@@ -6,7 +6,6 @@ Source: Stroppa et al., Eqs. (4) and (5).
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.controllers.shared_control.checks import not_negative, positive, sample_count, vector
@@ -16,6 +15,7 @@ from soro_lib.controllers.shared_control.guidance import (
     distance_to_goal,
     guidance_force,
 )
+from soro_lib.jit import inlined
 
 
 class FixedRule(NamedTuple):
@@ -39,7 +39,7 @@ class FixedState(NamedTuple):
 FIXED_START = FixedState(distance=-1.0, place=0, magnitude=0.0)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def fixed_step(
     rule: FixedRule, state: FixedState, window: NDArray[np.float64], distance: float, samples: float
 ) -> FixedState:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.controllers.shared_control.checks import Vector, goal_points, positive, vector
+from soro_lib.jit import inlined
 
 PHASES = ("start", "grasping", "lifting with item", "placing", "lifting empty", "end")
 BEGIN, GRASPING, LIFTING_WITH_ITEM, PLACING, LIFTING_EMPTY, END = range(6)
@@ -38,7 +38,7 @@ class GoalState(NamedTuple):
     pick: Vector
 
 
-@register_jitable(forceinline=True)
+@inlined
 def lift_goal(rule: GoalRule, end_effector: Vector) -> Vector:
     """Proxy above the tip: retract along the ray from the base until z is smaller by the offset.
 
@@ -52,7 +52,7 @@ def lift_goal(rule: GoalRule, end_effector: Vector) -> Vector:
     return (scale * end_effector[0], scale * end_effector[1], scale * end_effector[2])
 
 
-@register_jitable(forceinline=True)
+@inlined
 def fetch(rule: GoalRule, item: int) -> GoalState:
     """Turn to an item, or end where none is left."""
     if item >= len(rule.items):
@@ -62,7 +62,7 @@ def fetch(rule: GoalRule, item: int) -> GoalState:
     return GoalState(GRASPING, item, place, place)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def goal_step(rule: GoalRule, state: GoalState, end_effector: Vector, item_held: bool) -> GoalState:
     """One call of Goal Selection; several transitions may happen in it (Stroppa et al., Fig. 4, SC-35).
 

@@ -7,26 +7,26 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from soro_lib.controllers.shared_control.checks import Vector
+from soro_lib.jit import inlined
 
 
-@register_jitable(forceinline=True)
+@inlined
 def distance_to_goal(end_effector: Vector, goal: Vector) -> float:
     """Euclidean distance m = |g - ee| [m] (Stroppa et al., Section 4)."""
     x, y, z = goal[0] - end_effector[0], goal[1] - end_effector[1], goal[2] - end_effector[2]
     return math.sqrt(x * x + y * y + z * z)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def hooke_magnitude(stiffness: float, distance: float, maximum_force: float) -> float:
     """Magnitude of the guidance force [N], capped (Stroppa et al., Eq. (2))."""
     return min(stiffness * distance, maximum_force)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def damped_magnitude(
     stiffness: float, damping: float, distance: float, distance_rate: float, maximum_force: float
 ) -> float:
@@ -38,7 +38,7 @@ def damped_magnitude(
     return min(max(stiffness * distance + damping * distance_rate, 0.0), maximum_force)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def guidance_force(magnitude: float, end_effector: Vector, goal: Vector, unit_direction: bool) -> Vector:
     """Force along the line from the end-effector to the goal [N] (Stroppa et al., Eqs. (2) and (4)).
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numba.extending import register_jitable
 
 from soro_lib.controllers.shared_control.checks import Vector, finite_vector
+from soro_lib.jit import inlined
 
 ASSISTANCES = ("none", "as needed", "fixed")
 
@@ -60,7 +60,7 @@ PARADIGMS = {
 }
 
 
-@register_jitable(forceinline=True)
+@inlined
 def desired_position(command: Vector, goal: Vector, automation: Vector) -> Vector:
     """Blend the operator's command with the goal, axis by axis.
 
