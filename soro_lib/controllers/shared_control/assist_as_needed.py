@@ -7,7 +7,6 @@ import math
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
 from soro_lib.controllers.shared_control.checks import not_negative, positive, sample_count, vector
@@ -17,6 +16,7 @@ from soro_lib.controllers.shared_control.guidance import (
     guidance_force,
     hooke_magnitude,
 )
+from soro_lib.jit import inlined
 
 MOTIONS = ("start", "reached", "steady", "away", "closer")
 START, REACHED, STEADY, AWAY, CLOSER = range(5)
@@ -54,7 +54,7 @@ class AssistState(NamedTuple):
 ASSIST_START = AssistState(stiffness=0.0, distance=-1.0, motion=START, elapsed=0.0)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def classify_motion(rule: AssistRule, previous_distance: float, distance: float, samples: float) -> int:
     """Where the tip is heading: one of the states of Fig. 5 (Stroppa et al., Table 3 for the thresholds)."""
     if previous_distance < 0.0:
@@ -69,7 +69,7 @@ def classify_motion(rule: AssistRule, previous_distance: float, distance: float,
     return STEADY
 
 
-@register_jitable(forceinline=True)
+@inlined
 def reaction_time(rule: AssistRule, motion: int) -> float:
     """Delay xi of a state [samples]; there is none at the goal (Erratum SC-6)."""
     if motion == STEADY:
@@ -81,7 +81,7 @@ def reaction_time(rule: AssistRule, motion: int) -> float:
     return 0.0
 
 
-@register_jitable(forceinline=True)
+@inlined
 def reaction_counter(rule: AssistRule, previous: int, motion: int, elapsed: float, samples: float) -> float:
     """Time tau spent waiting [samples]: zero on entry, then counting (Erratum SC-2).
 
@@ -101,7 +101,7 @@ def reaction_counter(rule: AssistRule, previous: int, motion: int, elapsed: floa
     return ARMED if program and waited >= delay else waited
 
 
-@register_jitable(forceinline=True)
+@inlined
 def stiffness_change(rule: AssistRule, motion: int, elapsed: float) -> float:
     """Direction in which the stiffness moves: +1, 0 or -1 (Stroppa et al., Eq. (3), Errata SC-1, SC-5, SC-6).
 
@@ -116,7 +116,7 @@ def stiffness_change(rule: AssistRule, motion: int, elapsed: float) -> float:
     return 1.0 if motion in (STEADY, AWAY) else -1.0
 
 
-@register_jitable(forceinline=True)
+@inlined
 def assist_step(rule: AssistRule, state: AssistState, distance: float, samples: float) -> AssistState:
     """One iteration of assist-as-needed (Stroppa et al., Eq. (3) and Fig. 5).
 

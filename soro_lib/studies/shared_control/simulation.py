@@ -17,12 +17,12 @@ import joblib
 import numba
 import numpy as np
 import pandas as pd
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from soro_lib.controllers.shared_control.checks import Vector
 from soro_lib.controllers.shared_control.goal_selection import LIFTING_EMPTY
 from soro_lib.controllers.shared_control.guidance import distance_to_goal
+from soro_lib.jit import inlined
 from soro_lib.operators import EXPERT, Operator
 from soro_lib.operators.hand import hand_command
 from soro_lib.operators.loop import OperatorState, View, operator_start, operator_step, picture_buffer
@@ -90,7 +90,7 @@ class TrialPlan:
     labels: Mapping[str, Any] = field(default_factory=dict)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def next_place(task: TaskRule, state: TaskState, items: NDArray[np.float64]) -> Vector:
     """Where the operator wants to go: the target of the item in the gripper, else the next item."""
     if state.gripper.item != NOTHING:
@@ -100,7 +100,7 @@ def next_place(task: TaskRule, state: TaskState, items: NDArray[np.float64]) -> 
     return (items[item, 0], items[item, 1], items[item, 2])
 
 
-@register_jitable(forceinline=True)
+@inlined
 def write_trace(line: NDArray[np.float64], task: TaskRule, state: TaskState, command: Any) -> None:
     """Fill one line of the trace."""
     line[0] = SAMPLE_TIME * state.sample
@@ -119,7 +119,7 @@ def write_trace(line: NDArray[np.float64], task: TaskRule, state: TaskState, com
     line[22] = state.closed
 
 
-@register_jitable(forceinline=True)
+@inlined
 def play(
     task: TaskRule,
     state: TaskState,

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.controllers.shared_control.assist_as_needed import (
@@ -42,6 +41,7 @@ from soro_lib.controllers.shared_control.goal_selection import (
 )
 from soro_lib.controllers.shared_control.guidance import distance_to_goal, guidance_force, hooke_magnitude
 from soro_lib.controllers.shared_control.paradigms import ASSISTANCES, PARADIGMS, Paradigm, desired_position
+from soro_lib.jit import inlined
 from soro_lib.robots.soft_growing_plant import (
     NOTHING,
     REAL_GRIPPER,
@@ -262,13 +262,13 @@ def task_start(rule: TaskRule, start: Vector) -> TaskState:
 # --- One sample ----------------------------------------------------------------------------------------
 
 
-@register_jitable(forceinline=True)
+@inlined
 def horizontal(a: Vector, b: Vector) -> float:
     """Distance of two points in the x-y plane [m]."""
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def carry(rule: TaskRule, items: NDArray[np.float64], before: int, after: int, tip: Vector) -> None:
     """Move the held item with the tip; a released one falls straight down to where it lay."""
     moved = after if after != NOTHING else before
@@ -277,7 +277,7 @@ def carry(rule: TaskRule, items: NDArray[np.float64], before: int, after: int, t
         items[moved, 2] = tip[2] if after != NOTHING else rule.items[moved][2]
 
 
-@register_jitable(forceinline=True)
+@inlined
 def assist(
     rule: TaskRule,
     assisted: AssistState,
@@ -297,7 +297,7 @@ def assist(
     return assisted, fixed, magnitude, guidance_force(magnitude, tip, goal, rule.unit_direction)
 
 
-@register_jitable(forceinline=True)
+@inlined
 def approach_goal(automatic: Vector, goal: Vector) -> Vector:
     """Let the automatic command close in on the goal, as the authors' program does."""
     share = SAMPLE_TIME / (AUTOMATIC_LAG + SAMPLE_TIME)
@@ -308,7 +308,7 @@ def approach_goal(automatic: Vector, goal: Vector) -> Vector:
     )
 
 
-@register_jitable(forceinline=True)
+@inlined
 def task_step(
     rule: TaskRule,
     state: TaskState,
@@ -374,7 +374,7 @@ def task_step(
     )
 
 
-@register_jitable(forceinline=True)
+@inlined
 def delivered(rule: TaskRule, state: TaskState) -> bool:
     """Whether the last item has been released on its target."""
     last = state.goal.item >= len(rule.goals.items) - 1
