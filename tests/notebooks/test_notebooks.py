@@ -19,7 +19,7 @@ from soro_lib.reporting import compare
 from soro_lib.workbook import execution
 from soro_lib.workbook.__main__ import main
 from soro_lib.workbook.display import VERDICTS
-from soro_lib.workbook.notebooks import find_notebooks
+from soro_lib.workbook.notebooks import OVERVIEW, find_notebooks
 from soro_lib.workbook.runner import count_verdicts
 
 CELL_LIMIT_S = 300
@@ -70,14 +70,15 @@ def test_notebook_runs_with_small_parameters(
         verdicts = count_verdicts(tmp_path / slug / "scorecard.csv")
         assert verdicts
         assert set(verdicts) <= set(VERDICTS)
-    assert not changed(slug, tmp_path), "see the head of this file"
+    if slug != OVERVIEW:  # which shows the scorecards that are committed
+        assert not changed(slug, tmp_path), "see the head of this file"
 
 
 @pytest.mark.soak
 @pytest.mark.notebook
 @pytest.mark.parametrize("threads", ["1", "2"])
 @pytest.mark.parametrize("kernel", [OLDEST, NEW])
-@pytest.mark.parametrize("slug", find_notebooks(ROOT / "notebooks"))
+@pytest.mark.parametrize("slug", sorted(find_notebooks(ROOT / "notebooks").keys() - {OVERVIEW}))
 def test_same_outputs_with_any_kernel_and_number_of_threads(
     slug: str, kernel: str, threads: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
