@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from soro_lib.reporting import policy
 
 RESOLUTION = {
-    **{"m": 1e-9, "cm": 1e-7, "mm": 1e-6, "nm": 1e-6},
+    **{"m": 1e-9, "cm": 1e-7, "mm": 1e-6, "nm": 1e-9},
     **{"rad": 1e-9, "deg": 1e-6},
     **{"s": 1e-9, "ms": 1e-6, "m/s": 1e-9, "mm/s": 1e-6, "Hz": 1e-6},
     **{"N": 1e-6, "N/m": 1e-6, "N/mm": 1e-6, "%": 1e-6, "percent": 1e-6},
