@@ -4,6 +4,8 @@ A pose is a homogeneous transform, shape (..., 4, 4), from the named frame to th
 between matrices, quaternions (scalar last) and rotation vectors are `scipy.spatial.transform.Rotation`'s.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
@@ -58,6 +60,20 @@ def transform_points(transform: ArrayLike, points: ArrayLike) -> FloatArray:
 def pointing_direction(transform: ArrayLike) -> FloatArray:
     """Return the z axis of the poses in the base frame, shape (..., 3): where the tip points."""
     return _as_transform(transform, "transform")[..., :3, 2].copy()
+
+
+def magnitude(vector: ArrayLike) -> float:
+    """Return the length of one vector (n,).
+
+    Not by np.linalg.norm, which asks BLAS: its last bit differs from processor to processor, and in a closed
+    loop that is chaotic the last bit decides where it ends.
+
+    Examples
+    --------
+    >>> magnitude([3.0, 4.0])
+    5.0
+    """
+    return math.hypot(*np.asarray(vector, dtype=float).tolist())
 
 
 def angle_between(a: ArrayLike, b: ArrayLike) -> FloatArray:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
 from soro_lib.estimators.handover_filters import APPENDIX_A, FilterParameters, HandoverFilters
 from soro_lib.estimators.shape_estimation import POSE_WEIGHTS, ShapeEstimate, estimate_shape
+from soro_lib.poses import magnitude
 from soro_lib.robots.helix_kernels import tip_points
 from soro_lib.robots.helix_plant import TendonMotors
 from soro_lib.sensing.handover_observation import HandoverObservation
@@ -259,7 +260,7 @@ class HandoverController:
 
         measured = self.filters.points
         goal = self._goal(measured)
-        error = float(np.linalg.norm(goal - measured))
+        error = magnitude(goal - measured)
         if error < self.parameters.stop_threshold:
             return self._arrive(measured, goal, error)
         if self._stuck(error):
@@ -281,7 +282,7 @@ class HandoverController:
         out."""
         parameters = self.parameters
         if not parameters.estimate_shape:
-            residual = float(np.linalg.norm(self.arm.tip_points(self.q_sys) - measured))
+            residual = magnitude(self.arm.tip_points(self.q_sys) - measured)
             return ShapeEstimate(self.q_sys.copy(), 0.0, residual, 0, True, "")
         weights: ArrayLike = parameters.pose_weights
         if parameters.bend_softening:
@@ -297,7 +298,7 @@ class HandoverController:
         ball = self.filters.ball.state
         if self._task_mode is Mode.APPROACH:
             above = goal_over(ball, self.parameters.grasp_offset, length)
-            if np.linalg.norm(above - measured) >= self.parameters.stop_threshold:
+            if magnitude(above - measured) >= self.parameters.stop_threshold:
                 return above
             self._enter(Mode.DESCEND)
         return goal_over(ball, 0.0, length)
@@ -328,15 +329,15 @@ class HandoverController:
         """Return the look without what cannot be true, and why the arm should hold ("" if it need not)."""
         rules = self.parameters.safety
         wrist, direction, ball = (finite(v) for v in (look.wrist, look.direction, look.ball))
-        if direction is not None and not abs(np.linalg.norm(direction) - 1) < 0.1:
+        if direction is not None and not abs(magnitude(direction) - 1) < 0.1:
             direction = None
         if ball is not None and not look.disagreement <= rules.largest_disagreement:
             ball = None
-        if wrist is not None and np.linalg.norm(wrist) > sum(self.arm.maximum_lengths) + rules.reach_margin:
+        if wrist is not None and magnitude(wrist) > sum(self.arm.maximum_lengths) + rules.reach_margin:
             wrist = None
         if wrist is None or self._last_wrist is None or not np.array_equal(wrist, self._last_wrist):
             self._repeats = 0
-        elif np.linalg.norm(self._expected_move) > rules.noticeable_move:
+        elif magnitude(self._expected_move) > rules.noticeable_move:
             self._repeats += 1
         self._last_wrist = wrist
         if self._repeats >= rules.frozen_looks:
@@ -357,8 +358,8 @@ class HandoverController:
             return None
         rules = self.parameters.safety
         last, new = self._last_seen.get(name), self._jumped_to.get(name)
-        if last is not None and np.linalg.norm(point - last) > rules.largest_jump:
-            stayed = new is not None and np.linalg.norm(point - new) <= rules.largest_jump
+        if last is not None and magnitude(point - last) > rules.largest_jump:
+            stayed = new is not None and magnitude(point - new) <= rules.largest_jump
             self._looks_after_jump[name] = self._looks_after_jump[name] + 1 if stayed else 1
             self._jumped_to[name] = point
             if self._looks_after_jump[name] < rules.jump_confirmations:

@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.poses import magnitude
 from soro_lib.robots.helix import HelixArm
 from soro_lib.robots.helix_kernels import (
     cholesky,
@@ -404,7 +405,7 @@ class VirtualStiffnessController:
         commanded, estimated, goal, measured = arrays
         step_size = self.step_size
         if callable(step_size):
-            step_size = step_size(float(np.linalg.norm(goal - measured)))
+            step_size = step_size(magnitude(goal - measured))
         new_sys, new_est, residual, iterations, converged, crops = reach_goal(
             commanded,
             estimated,

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from soro_lib.poses import magnitude
 from soro_lib.sensing.handover_observation import HandoverObservation
 
 
@@ -98,7 +99,7 @@ class PointFilter:
         """Expect the point to make a share of the commanded movement (3,): Eq. (14)."""
         noise = self.noise
         self.state = self.state + noise.expected_move * move
-        self.variance += noise.process + noise.move_deviation**2 * float(move @ move)
+        self.variance += noise.process + noise.move_deviation**2 * magnitude(move) ** 2
 
     def update(self, measured: NDArray[np.float64], claimed_deviation: float) -> None:
         """Weigh in a measured point (3,): Eq. (15)."""
@@ -123,7 +124,7 @@ class HandoverFilters:
 
     def __init__(self, parameters: FilterParameters, start_points: NDArray[np.float64]) -> None:
         wrist, gripper = np.asarray(start_points, dtype=float).reshape(2, 3)
-        self.gripper_length = float(np.linalg.norm(gripper - wrist))
+        self.gripper_length = magnitude(gripper - wrist)
         self.ball = PointFilter(parameters.ball, gripper)
         self.wrist = PointFilter(parameters.wrist, wrist)
         self.direction = PointFilter(parameters.direction, (gripper - wrist) / self.gripper_length)
@@ -165,4 +166,4 @@ def points_from_direction(
 ) -> NDArray[np.float64]:
     """Return wrist and gripper (6,) [m] from the wrist (3,) and a direction (3,) of any length (Eqs.
     (12)-(13))."""
-    return np.concatenate([wrist, wrist + gripper_length * direction / np.linalg.norm(direction)])
+    return np.concatenate([wrist, wrist + gripper_length * direction / magnitude(direction)])

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.poses import magnitude
 from soro_lib.robots.helix_kernels import (
     cholesky,
     cholesky_solve,
@@ -111,7 +112,7 @@ def estimate_shape(
     """
     commanded, points, scale = checked_arguments(q_sys, measured_points, bound, weights)
     q, iterations, at_rest = sequential_least_distance(commanded, points, bound, scale, gripper_length)
-    residual = float(np.linalg.norm(tip_points_and_jacobian(q, gripper_length)[0] - points))
+    residual = magnitude(tip_points_and_jacobian(q, gripper_length)[0] - points)
     explained = residual <= bound * (1 + 1e-6) + 1e-9
     reason = ""
     if not explained:

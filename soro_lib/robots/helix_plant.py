@@ -27,6 +27,7 @@ from soro_lib.robots.helix_kernels import (
     dot,
     largest,
     multiply,
+    outer_gram,
     tip_points_and_jacobian,
 )
 
@@ -195,11 +196,11 @@ def add_grip(
     for k in range(6):
         points[k] -= held[k]
     pull = multiply(jacobian.T, points)
-    curvature = grip * jacobian.T @ jacobian
+    curvature = outer_gram(jacobian.T)
     for i in range(9):
         gradient[i] += grip * pull[i]
         for j in range(9):
-            hessian[i, j] += curvature[i, j]
+            hessian[i, j] += grip * curvature[i, j]
 
 
 @dataclass

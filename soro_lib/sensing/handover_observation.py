@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from soro_lib.poses import magnitude
 from soro_lib.project import data_directory
 from soro_lib.robots.helix import HelixArm
 from soro_lib.robots.helix_kernels import tip_points
@@ -167,12 +168,12 @@ class NoisyObserver:
         noise = self.noise
         bias = self._pose_dependent_error(wrist, rng)
         jitter = rng.standard_normal((3, 3))
-        covered = np.linalg.norm(points[3:] - ball) < noise.occlusion_distance
+        covered = magnitude(points[3:] - ball) < noise.occlusion_distance
         ball_deviation = np.hypot(noise.ball_jitter, noise.occluded_ball if covered else 0.0)
         seen_direction = direction + noise.direction_jitter * jitter[1] + noise.direction_bias * bias[1]
         return HandoverObservation(
             wrist=wrist + noise.wrist_jitter * jitter[0] + noise.wrist_bias * bias[0],
-            direction=seen_direction / np.linalg.norm(seen_direction),
+            direction=seen_direction / magnitude(seen_direction),
             ball=ball + ball_deviation * jitter[2] + noise.ball_bias * bias[2],
             wrist_deviation=float(np.hypot(noise.wrist_jitter, noise.wrist_bias)),
             direction_deviation=float(np.hypot(noise.direction_jitter, noise.direction_bias)),
@@ -190,7 +191,7 @@ class NoisyObserver:
         if self._bias is None:
             self._bias = fresh
         else:
-            memory = np.exp(-np.linalg.norm(wrist - self._wrist) / self.noise.bias_length)
+            memory = np.exp(-magnitude(wrist - self._wrist) / self.noise.bias_length)
             self._bias[:2] = memory * self._bias[:2] + np.sqrt(1 - memory**2) * fresh[:2]
         self._wrist = wrist
         return self._bias

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from soro_lib.controllers.handover import HandoverCommand, HandoverController, HandoverParameters, Mode
 from soro_lib.controllers.virtual_stiffness import within_limits
+from soro_lib.poses import magnitude
 from soro_lib.robots.helix_plant import Hand, HelixPlant, TendonMotors
 from soro_lib.sensing.handover_observation import HandoverObservation, Observer
 from soro_lib.studies.soft_handover.handover import Guide, Scene, run_handover
@@ -179,8 +180,8 @@ def flipped_markers(share: float) -> Change:
         if rng.random() >= share or step < ONSET or look.wrist is None or look.direction is None:
             return look
         aside = rng.standard_normal(3)
-        aside -= (aside @ look.direction) * look.direction
-        aside /= np.linalg.norm(aside)
+        aside -= np.sum(aside * look.direction) * look.direction
+        aside /= magnitude(aside)
         direction = np.cos(np.pi / 3) * look.direction + np.sin(np.pi / 3) * aside
         return replace(look, direction=direction, wrist=look.wrist + 0.08 * aside)
 
@@ -209,7 +210,7 @@ def noise_times(factor: float) -> Change:
         return replace(
             look,
             wrist=look.wrist + look.wrist_deviation * extra[0],
-            direction=direction / np.linalg.norm(direction),
+            direction=direction / magnitude(direction),
             ball=look.ball + look.ball_deviation * extra[2],
         )
 
@@ -223,7 +224,7 @@ def pushed_away(distance: float, gripper_length: float = 0.10) -> Guide:
         if not ONSET <= step < ONSET + 10:
             return None
         away = (gripper - ball) * np.array([1.0, 1.0, 0.0])
-        place = ball + np.array([0.0, 0.0, -0.05]) + distance * away / max(np.linalg.norm(away), 1e-6)
+        place = ball + np.array([0.0, 0.0, -0.05]) + distance * away / max(magnitude(away), 1e-6)
         return Hand(np.concatenate([place - np.array([0, 0, gripper_length]), place]))
 
     return guide
