@@ -9,6 +9,7 @@ RUN = .venv/bin/python -m
 JOBS =
 ONLY =
 REF =
+RUNS =
 SMALL =
 
 # `make -B` asks for everything anew; the runner knows this as --force.
@@ -56,8 +57,9 @@ check: env ## lint, types, and whether what is committed is what the notebooks p
 lab: env ## open JupyterLab on the overview notebook
 	@$(RUN) jupyterlab notebooks/00_overview.ipynb
 
-bench: env ## measure speed against other libraries (installs them beside)
-	@$(RUN) benchmarks.run --install-peers
+bench: env ## measure speed against other libraries (installs them beside), or against a commit (REF)
+	@$(RUN) benchmarks.run $(if $(REF),--against $(REF),--install-peers) $(if $(RUNS),--runs $(RUNS)) \
+	    $(foreach module,$(ONLY),--only $(module))
 
 html: figures ## export the executed notebooks with an index page to build/html
 	@$(RUN) soro_lib.workbook html

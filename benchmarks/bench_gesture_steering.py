@@ -1,4 +1,4 @@
-"""Gesture steering: one control step, its quadratic program against other solvers, a replayed minute.
+"""Gesture steering: one control step, its filter and quadratic program against others, a replayed minute.
 
 The quadratic program is the same for all, which is checked before anything is timed. SLSQP solves the
 nonlinear problem that the paper gives to its SQP, from the same start.
@@ -14,6 +14,7 @@ from scipy.optimize import minimize
 from benchmarks.run import Row, compare, seconds_per_call
 from soro_lib.controllers.gesture_steering import GestureSteering, replay
 from soro_lib.controllers.steering_step import ReadableStep, StepBounds, StepWeights, pose_step, solve
+from soro_lib.estimators.palm_filter import PalmFilter, ReadablePalmFilter
 from soro_lib.robots import CableDrivenArm
 from soro_lib.robots.cable_driven_kernels import compiled_kinematics, generic_kinematics
 from soro_lib.sensing.hand_tracking import hand_samples
@@ -44,6 +45,7 @@ def rows() -> list[Row]:
     np.testing.assert_allclose(fast().actuation_step, parametrised().actuation_step, atol=1e-5)
     return [
         *control_step(),
+        *palm_filter(),
         *compare("one step, Eq. (26), assembled and solved", fast,
                  {"raw daqp, already assembled (goal: at most 3 times)": raw_daqp(pose),
                   "parametrised cvxpy (goal: 30 times)": parametrised}),
@@ -58,7 +60,7 @@ def rows() -> list[Row]:
 def control_step() -> list[Row]:
     """Time whole control steps on the shipped recording: filter, interpolation, kinematics, program."""
     samples = list(hand_samples(load_recording("steering_minute")))
-    steering = GestureSteering(ARM)
+    steering, with_filterpy = GestureSteering(ARM), GestureSteering(ARM)
 
     def minute() -> None:
         replay(GestureSteering(ARM), samples)
@@ -68,12 +70,35 @@ def control_step() -> list[Row]:
         for sample in samples[:1000]:
             steering.update(sample)
 
-    step = seconds_per_call(thousand) / 1000
+    def thousand_with_filterpy() -> None:
+        with_filterpy.reset(ARM.home)
+        with_filterpy._palm = ReadablePalmFilter(with_filterpy.settings.palm_filter)
+        for sample in samples[:1000]:
+            with_filterpy.update(sample)
+
+    step, slow_step = (seconds_per_call(steps) / 1000 for steps in (thousand, thousand_with_filterpy))
+    np.testing.assert_allclose(steering.actuation, with_filterpy.actuation, atol=1e-9)
     whole = seconds_per_call(minute, repeats=3)
     return [
         Row("control step, whole", step * 1e6, "us", "period of the sensor: 8670 us", 8.67e-3 / step, 100.0),
+        Row("control step, whole", step * 1e6, "us", f"with filterpy's filter: {slow_step * 1e6:.3g} us",
+            slow_step / step, 100.0),
         Row("a recorded minute, replayed", whole, "s", "the minute: 60 s", 60.0 / whole, 1.0),
-    ]
+    ]  # fmt: skip
+
+
+def palm_filter() -> list[Row]:
+    """Time the filter of the palm on measurements of position and velocity."""
+    filters = PalmFilter(), ReadablePalmFilter()
+    position, velocity, interval = np.array([0.02, 0.2, 0.01]), np.array([0.1, 0.0, -0.05]), 8.67e-3
+
+    def step(palm: PalmFilter) -> Callable[[], Any]:
+        return lambda: palm.update((palm.time or 0.0) + interval, position, velocity)
+
+    ours, theirs = map(step, filters)
+    for _ in range(100):
+        np.testing.assert_allclose(ours(), theirs(), atol=1e-12)
+    return compare("palm filter, one measurement, Eqs. (6)-(12)", ours, {"filterpy, nine states": theirs})
 
 
 def raw_daqp(pose: Any) -> Callable[[], Any]:

@@ -51,10 +51,10 @@ def rows() -> list[Row]:
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         measured.append(
             Row(
-                f"{count} trials, {count / spent:.0f} per s on {CORES} threads, peak {memory:.0f} MB",
+                f"{count} trials on {CORES} threads, wall",
                 spent,
                 "s",
-                f"plain Python loop: {plain:.2f} trials/s",
+                f"{count / spent:.0f} per s, peak {memory:.0f} MB; plain Python loop: {plain:.2f} per s",
                 count / spent / plain,
             )
         )
@@ -66,14 +66,14 @@ def _studies() -> list[Row]:
     crowd = _seconds(lambda: simulate(demonstration_plans(200, seed=1), jobs=CORES))
     return [
         Row(
-            "tuning study, 192 trials, both analyses of four responses",
+            "tuning study, 192 trials, both analyses of four responses, wall",
             tuning,
             "s",
             "the goal",
             2 / tuning,
             2.0,
         ),
-        Row("24000 demonstration trials", crowd, "s", "the goal", 30 / crowd, 30.0),
+        Row("24000 demonstration trials, wall", crowd, "s", "the goal", 30 / crowd, 30.0),
     ]
 
 
@@ -164,6 +164,7 @@ def _endless() -> Iterator[TrialPlan]:
 
 
 def _seconds(call: Callable[[], Any], warm: bool = True) -> float:
+    """Wall time [s]: the trials run in several threads."""
     if warm:
         simulate(islice(_endless(), 4))
     start = time.perf_counter()

@@ -1,7 +1,10 @@
 """Measures speed against other libraries, all in one run, and prints the ratios: ``make bench``.
 
 Every module ``benchmarks/bench_<theme>.py`` offers ``rows() -> list[Row]``. The ratios are what counts: both
-sides are measured on the same machine within the same minute.
+sides are measured on the same machine within the same minute. Times are CPU times, which other work on the
+machine hardly changes; a row whose work runs in several threads says wall.
+
+``make bench REF=<commit>`` measures against another commit instead, see `benchmarks.alternation`.
 """
 
 import argparse
@@ -12,9 +15,12 @@ import platform
 import re
 import subprocess
 import sys
+import tempfile
+import time
 import timeit
 import tomllib
-from collections.abc import Callable, Iterable
+import traceback
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +28,7 @@ from typing import Any
 # Before numpy is loaded: one thread on either side.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
     os.environ.setdefault(variable, "1")
+os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
 
 ROOT = Path(__file__).resolve().parent.parent
 NOT_INSTALLED = "peer not installed"
@@ -34,7 +41,8 @@ class Row:
     Parameters
     ----------
     name : str
-        What is computed, such as ``tip pose, one at a time``.
+        What is computed, such as ``tip pose, one at a time``. Rows of two commits are matched by it, so it
+        holds nothing that is measured.
     value : float
         What ours takes, or reaches.
     unit : str
@@ -56,9 +64,9 @@ class Row:
 
 
 def seconds_per_call(call: Callable[[], Any], repeats: int = 5) -> float:
-    """Return the best time of a call over several repeats, after a first call that is not counted [s]."""
+    """Return the best CPU time of a call over several repeats, after a first call that is not counted [s]."""
     call()
-    timer = timeit.Timer(call)
+    timer = timeit.Timer(call, timer=time.process_time)
     number, _ = timer.autorange()
     return min(timer.repeat(repeats, number)) / number
 
@@ -83,11 +91,44 @@ def compare(
     return rows
 
 
-def collect() -> Iterable[Row]:
-    """Yield the rows of every benchmark module; one that fails is reported and does not stop the others."""
-    for path in sorted(Path(__file__).parent.glob("bench_*.py")):
-        print(f"{path.stem} ...", file=sys.stderr, flush=True)
-        yield from importlib.import_module(f"benchmarks.{path.stem}").rows()
+def process_cost(command: Sequence[str], folder: Path, environment: Mapping[str, str]) -> tuple[float, float]:
+    """Run a command and return its cost with all processes that it waits for.
+
+    Returns
+    -------
+    tuple of float
+        CPU time of all of them together [s], peak memory of the largest [MB].
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        If the command fails; the exception has what it wrote.
+    """
+    with tempfile.TemporaryFile("w+") as output:
+        process = subprocess.Popen(
+            command, cwd=folder, env=environment, stdout=output, stderr=subprocess.STDOUT
+        )
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode:
+            output.seek(0)
+            raise subprocess.CalledProcessError(process.returncode, command, output.read())
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+
+
+def module_names() -> list[str]:
+    """Return the names of the benchmark modules here."""
+    return sorted(path.stem for path in Path(__file__).parent.glob("bench_*.py"))
+
+
+def collect(modules: Iterable[str]) -> Iterable[Row]:
+    """Yield the rows of benchmark modules; one that fails is reported and does not stop the others."""
+    for module in modules:
+        print(f"{module} ...", file=sys.stderr, flush=True)
+        try:
+            yield from importlib.import_module(f"benchmarks.{module}").rows()
+        except Exception:
+            traceback.print_exc()
 
 
 def install_peers() -> None:
@@ -114,12 +155,27 @@ def table(rows: Iterable[Row]) -> str:
 
 
 def main() -> None:
-    """Run all benchmarks, print the table and write ``build/benchmarks.json``."""
+    """Run benchmarks and print the table: against other libraries, or against another checkout."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--install-peers", action="store_true", help="first install the libraries to compare")
-    if parser.parse_args().install_peers:
+    parser.add_argument("--only", action="append", choices=module_names(), help="this module (repeatable)")
+    parser.add_argument("--against", metavar="REF", help="a commit, or the folder of a checkout")
+    parser.add_argument("--runs", type=int, default=5, help="runs of either side, with --against")
+    options = parser.parse_args()
+    modules = options.only or module_names()
+    if options.against:
+        from benchmarks.alternation import compare_with
+
+        compare_with(options.against, modules, options.runs)
+        return
+    if options.install_peers:
         install_peers()
-    rows = list(collect())
+    _measure(modules)
+
+
+def _measure(modules: Iterable[str]) -> None:
+    """Measure against other libraries and write ``build/benchmarks.json``."""
+    rows = list(collect(modules))
     print(table(rows))
     machine = {"python": platform.python_version(), "system": platform.platform(), "cores": os.cpu_count()}
     target = ROOT / "build" / "benchmarks.json"

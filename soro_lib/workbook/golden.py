@@ -71,7 +71,7 @@ def build(reference: str, root: Path = ROOT) -> Path:
     partial = folder.with_name(folder.name + ".partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
-    with _work_tree(folder.name, root) as tree:
+    with work_tree(folder.name, root) as tree:
         python = _interpreter(tree, root)
         for name, quick in (("figures", []), ("quick", ["--quick"])):
             _say(f"{folder.name}: notebooks, {name}")
@@ -235,7 +235,8 @@ def _benchmarks(tree: Path, python: str) -> dict[str, float]:
 
 
 @contextmanager
-def _work_tree(commit: str, root: Path) -> Iterator[Path]:
+def work_tree(commit: str, root: Path = ROOT) -> Iterator[Path]:
+    """Check a commit out beside this checkout, in a folder that is gone again however the block ends."""
     tree = root / "build" / "golden" / f"{commit}.tree"
     _git(root, "worktree", "prune")
     if tree.exists():
