@@ -165,8 +165,14 @@ def main() -> None:
     modules = options.only or module_names()
     if options.against:
         from benchmarks.alternation import compare_with
+        from soro_lib.workbook.golden import GoldenError
 
-        compare_with(options.against, modules, options.runs)
+        try:
+            compare_with(options.against, modules, options.runs)
+        except GoldenError as error:
+            parser.error(str(error))
+        except KeyboardInterrupt:
+            sys.exit("stopped")
         return
     if options.install_peers:
         install_peers()
