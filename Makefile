@@ -42,7 +42,7 @@ soak: env ## run what is too long for make test: other kernels, threads and Pyth
 	@$(RUN) pytest -n logical --dist worksteal -m "soak or hypothesis" --hypothesis-profile soak
 
 golden: env ## keep what a commit writes, tests and offers (REF: that commit)
-	@$(RUN) soro_lib.workbook golden $(REF)
+	@$(RUN) soro_lib.workbook golden $(REF) $(if $(RUNS),--benchmarks $(RUNS))
 
 unchanged: figures ## say what this checkout does otherwise than its golden copy
 	@$(RUN) soro_lib.workbook unchanged

@@ -6,7 +6,6 @@ million of them where SORO_BENCH_LARGE is set.
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import time
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.run import ROOT, Row
+from benchmarks.run import ROOT, Row, peak_memory
 from soro_lib.operators import NAIVE
 from soro_lib.studies.shared_control import simulation
 from soro_lib.studies.shared_control.demonstrations import (
@@ -48,7 +47,7 @@ def rows() -> list[Row]:
     measured = []
     for count in (100, 1_000, 10_000, 100_000):
         spent = _seconds(lambda count=count: simulate(islice(_endless(), count), jobs=CORES))
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        memory = peak_memory()
         measured.append(
             Row(
                 f"{count} trials on {CORES} threads, wall",
@@ -110,7 +109,7 @@ def measure(way: Callable[[int], pd.DataFrame], count: int) -> None:
     start = time.process_time()
     way(count // TRIALS_PER_PERSON)
     spent = time.process_time() - start
-    print(json.dumps([resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, spent]))
+    print(json.dumps([peak_memory(), spent]))
 
 
 def in_chunks(people: int) -> pd.DataFrame:

@@ -10,12 +10,12 @@ machine hardly changes; a row whose work runs in several threads says wall.
 import argparse
 import importlib
 import json
+import math
 import os
 import platform
 import re
 import subprocess
 import sys
-import tempfile
 import time
 import timeit
 import tomllib
@@ -104,16 +104,35 @@ def process_cost(command: Sequence[str], folder: Path, environment: Mapping[str,
     subprocess.CalledProcessError
         If the command fails; the exception has what it wrote.
     """
-    with tempfile.TemporaryFile("w+") as output:
-        process = subprocess.Popen(
-            command, cwd=folder, env=environment, stdout=output, stderr=subprocess.STDOUT
-        )
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            output.seek(0)
-            raise subprocess.CalledProcessError(process.returncode, command, output.read())
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    # Its peak would begin with the memory of this process: it is started by a small one, which counts.
+    counted = [sys.executable, "-S", "-c", COUNT, *command]
+    done = subprocess.run(counted, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise subprocess.CalledProcessError(done.returncode, command, done.stdout + done.stderr)
+    spent, peak = json.loads(done.stdout.splitlines()[-1])
+    return spent, peak
+
+
+COUNT = """
+import json, resource, subprocess, sys
+status = subprocess.run(sys.argv[1:]).returncode
+usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+print()
+print(json.dumps([usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024]))
+sys.exit(status)
+"""
+
+
+def peak_memory() -> float:
+    """Return the largest memory of this process so far [MB], where Linux tells; else NaN.
+
+    Not ru_maxrss, which begins with the memory of the process that started this one.
+    """
+    try:
+        text = Path("/proc/self/status").read_text(encoding="ascii")
+    except FileNotFoundError:
+        return math.nan
+    return int(re.findall(r"VmHWM:\s+(\d+) kB", text)[0]) / 1024
 
 
 def module_names() -> list[str]:

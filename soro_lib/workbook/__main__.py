@@ -40,7 +40,9 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
                 print(f"{name},{digest}")
             return 0
         if options.command == "golden":
-            print(f"golden copy: {golden.build(options.reference or golden.stated_commit())}")
+            print(
+                f"golden copy: {golden.build(options.reference or golden.stated_commit(), benchmark_runs=options.benchmarks)}"
+            )
             return 0
         if options.command == "unchanged":
             return _unchanged(options)
@@ -145,6 +147,13 @@ def _parser() -> argparse.ArgumentParser:
     prints = commands.add_parser("digests", help="print the digest of every table and picture")
     copy = commands.add_parser("golden", help="keep all that a commit writes, tests, offers and costs")
     copy.add_argument("reference", nargs="?", help="commit in place of that of tests/golden/commit.toml")
+    copy.add_argument(
+        "--benchmarks",
+        type=int,
+        default=golden.BENCHMARK_RUNS,
+        metavar="N",
+        help="times to run the benchmarks, whose best counts; 0: leave them out",
+    )
     same = commands.add_parser("unchanged", help="say what this checkout does otherwise than its golden copy")
     make = commands.add_parser("generate", help="fit the plants or simulate the recordings again")
     make.add_argument("kind", choices=list(ROOMS))

@@ -54,8 +54,10 @@ def golden_folder(reference: str, root: Path = ROOT) -> Path:
     return root / "build" / "golden" / found.strip()[:12]
 
 
-def build(reference: str, root: Path = ROOT) -> Path:
+def build(reference: str, root: Path = ROOT, benchmark_runs: int = BENCHMARK_RUNS) -> Path:
     """Make the golden copy of a commit, unless it is there, and return its folder.
+
+    The benchmarks are run `benchmark_runs` times, which may be none; the best time of each counts.
 
     The commit's own code runs, in a work tree of its own, with this interpreter where both have the same
     lock, else in an environment made for it. What an old commit cannot do is said and left out.
@@ -85,7 +87,7 @@ def build(reference: str, root: Path = ROOT) -> Path:
             output = ["--output", str(partial / "small" / kind)]
             if _run(tree, python, "-m", "soro_lib.workbook", "generate", kind, "--small", *output):
                 _say(f"{folder.name} has no small form of {kind}; left out")
-        times = _benchmarks(tree, python)
+        times = _benchmarks(tree, python, benchmark_runs)
         (partial / "benchmarks.json").write_text(json.dumps(times, indent=1), encoding="utf-8")
     partial.rename(folder)
     return folder
@@ -221,11 +223,11 @@ def _changed_data(golden: Path, again: Path) -> list[str]:
     return problems
 
 
-def _benchmarks(tree: Path, python: str) -> dict[str, float]:
+def _benchmarks(tree: Path, python: str, runs: int) -> dict[str, float]:
     """Return the best time of every benchmark, by name; nothing of a commit whose benchmarks do not run."""
     best: dict[str, float] = {}
-    for number in range(BENCHMARK_RUNS):
-        _say(f"benchmarks, run {number + 1} of {BENCHMARK_RUNS}")
+    for number in range(runs):
+        _say(f"benchmarks, run {number + 1} of {runs}")
         if _run(tree, python, "-m", "benchmarks.run"):
             break
         rows = json.loads((tree / "build" / "benchmarks.json").read_text(encoding="utf-8"))["rows"]

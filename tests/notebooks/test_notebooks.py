@@ -84,6 +84,7 @@ def test_same_outputs_with_any_kernel_and_number_of_threads(
 ) -> None:
     monkeypatch.setenv(KERNEL, kernel)
     monkeypatch.setattr(execution, "THREADS", threads)
+    monkeypatch.setenv("OPENBLAS_THREAD_TIMEOUT", "4")  # waiting threads sleep, other tests run beside them
     run(slug, tmp_path)
     assert not changed(slug, tmp_path)
 

@@ -80,7 +80,8 @@ def loads(actuation):
     """Return the moments of both segments in the paper's terms: magnitudes r F_k and directions phi_k."""
     tension = -actuation[1:].reshape(2, 3)
     first, second, third = tension.T
-    force = np.sqrt(first**2 + second**2 + third**2 - first * second - first * third - second * third)
+    # first**2 + second**2 + third**2 - first * second - first * third - second * third, without cancellation
+    force = np.sqrt(0.5 * ((first - second) ** 2 + (second - third) ** 2 + (third - first) ** 2))
     angle = 2 * np.pi / 3 * np.arange(3)
     return ARM.cable_radius * force, np.arctan2(tension @ np.sin(angle), tension @ np.cos(angle))
 

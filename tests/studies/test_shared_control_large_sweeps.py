@@ -30,7 +30,7 @@ simulate(plans, chunk={CHUNK}, store=sys.argv[1])
 """
 
 MEMORY = """
-import json, resource, sys
+import json, sys
 import numpy as np
 from soro_lib.studies.shared_control import simulation
 from soro_lib.studies.shared_control.claims import claim_probabilities, evaluate_claims
@@ -42,8 +42,9 @@ simulation.simulate_chunk = lambda plans, time_limit: metrics[: len(plans)].copy
 trials = run_demonstrations(3200, 1)
 summary(trials), effects(trials), claim_probabilities(evaluate_claims(trials))
 figures.fig07b_time(trials), figures.fig08_error_against_time(trials)
-peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-print(json.dumps([len(trials), peak]))
+# Not ru_maxrss, which begins with the memory of the process that started this one.
+status = dict(line.split(":") for line in open("/proc/self/status"))
+print(json.dumps([len(trials), int(status["VmHWM"].split()[0]) / 1024]))
 """
 
 
