@@ -40,9 +40,8 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
                 print(f"{name},{digest}")
             return 0
         if options.command == "golden":
-            print(
-                f"golden copy: {golden.build(options.reference or golden.stated_commit(), benchmark_runs=options.benchmarks)}"
-            )
+            reference = options.reference or golden.stated_commit()
+            print(f"golden copy: {golden.build(reference, benchmark_runs=options.benchmarks)}")
             return 0
         if options.command == "unchanged":
             return _unchanged(options)
