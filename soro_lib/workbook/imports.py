@@ -9,6 +9,10 @@ from pathlib import Path
 PACKAGE = "soro_lib"
 
 
+TELLING = (ast.Import, ast.ImportFrom, ast.Attribute, ast.Constant, ast.keyword)
+"""Parts of code that are looked at; most of a module is none of these."""
+
+
 def dependencies(sources: Iterable[str], root: Path) -> set[Path]:
     """Return the files of the library that code imports, directly or through other modules of it.
 
@@ -45,10 +49,10 @@ def imported_names(source: str, package: str = "") -> frozenset[str]:
     package : str, optional
         Package that the module is in, to resolve relative imports.
     """
-    tree = _parse(source)
-    chains = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
+    nodes = _nodes(source)
+    chains = {_chain(node) for node in nodes if isinstance(node, ast.Attribute)}
     names = set()
-    for bound, target in _bindings(tree, package):
+    for bound, target in _bindings(nodes, package):
         if target.split(".")[0] == PACKAGE:
             names.add(target)
             names |= {target + chain.removeprefix(bound) for chain in chains if chain.startswith(f"{bound}.")}
@@ -60,21 +64,32 @@ def texts(source: str) -> frozenset[str]:
     """Return the string literals of code, apart from the names of a lazily imported package."""
     if _lazy_names(source):
         return frozenset()
-    constants = (node.value for node in ast.walk(_parse(source)) if isinstance(node, ast.Constant))
+    constants = (node.value for node in _nodes(source) if isinstance(node, ast.Constant))
     return frozenset(value for value in constants if isinstance(value, str))
 
 
-def _parse(source: str) -> ast.Module:
+def _chain(node: ast.expr) -> str:
+    """Return the dotted name that an attribute stands for, such as ``robots.HelixArm``; else nothing."""
+    names: list[str] = []
+    while isinstance(node, ast.Attribute):
+        names.append(node.attr)
+        node = node.value
+    return ".".join([node.id, *reversed(names)]) if isinstance(node, ast.Name) else ""
+
+
+@cache
+def _nodes(source: str) -> tuple[ast.AST, ...]:
+    """Return the parts of code that say what it takes: imports, dotted names, literals, keyword arguments."""
     try:
-        return ast.parse(re.sub(r"^\s*[%!?].*$", "", source, flags=re.MULTILINE))
+        tree = ast.parse(re.sub(r"^\s*[%!?].*$", "", source, flags=re.MULTILINE))
     except SyntaxError:
-        # It is the run that will fail, and say where.
-        return ast.Module(body=[], type_ignores=[])
+        return ()  # It is the run that will fail, and say where.
+    return tuple(node for node in ast.walk(tree) if isinstance(node, TELLING))
 
 
-def _bindings(tree: ast.Module, package: str) -> Iterable[tuple[str, str]]:
+def _bindings(nodes: Iterable[ast.AST], package: str) -> Iterable[tuple[str, str]]:
     """Yield every imported name with the dotted name that it stands for."""
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield alias.asname or alias.name, alias.name
@@ -105,7 +120,7 @@ def _files(dotted: str, root: Path) -> set[Path]:
 @cache
 def _lazy_names(init: str) -> dict[str, str]:
     """Return name -> submodule of the ``lazy_loader.attach`` call of a package, empty if it has none."""
-    for node in ast.walk(_parse(init)):
+    for node in _nodes(init):
         if isinstance(node, ast.keyword) and node.arg == "submod_attrs":
             modules = ast.literal_eval(node.value)
             return {name: module for module, names in modules.items() for name in names}
