@@ -1,6 +1,7 @@
 """A golden copy holds what a commit does, and a checkout that does otherwise is told."""
 
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,27 @@ def test_an_unknown_commit_is_refused(tmp_path):
     subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
     with pytest.raises(GoldenError, match="no-such-commit"):
         golden.build("no-such-commit", tmp_path)
+
+
+BENCHMARKS = """
+import json, pathlib, sys
+counter = pathlib.Path("counter")
+run = int(counter.read_text()) + 1 if counter.exists() else 1
+counter.write_text(str(run))
+if run > 3:
+    sys.exit("no fourth time")
+rows = [{"name": "step", "value": [3.0, 1.0, 2.0][run - 1]}, {"name": f"only run {run}", "value": 5.0}]
+pathlib.Path("build").mkdir(exist_ok=True)
+pathlib.Path("build/benchmarks.json").write_text(json.dumps({"rows": rows}))
+"""
+
+
+def test_the_best_time_of_each_benchmark_counts_until_one_run_fails(tmp_path):
+    (tmp_path / "benchmarks").mkdir()
+    (tmp_path / "benchmarks" / "run.py").write_text(BENCHMARKS)
+    best = golden._benchmarks(tmp_path, sys.executable, 5)
+    assert best == {"step": 1.0, "only run 1": 5.0, "only run 2": 5.0, "only run 3": 5.0}
+    assert golden._benchmarks(tmp_path, sys.executable, 0) == {}
 
 
 def test_every_generator_takes_the_small_form_and_a_folder():
