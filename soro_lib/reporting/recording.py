@@ -84,7 +84,9 @@ class Recorder(RendererAgg):
         """Keep the methods above, which Agg would replace by its own."""
 
     def _refuse(self, *_: Any, **__: Any) -> None:
-        raise NotImplementedError("a recording holds neither TeX nor filtered artists")
+        raise ValueError(
+            "a figure must have neither TeX nor filtered artists: a recording does not hold them"
+        )
 
     draw_tex = start_filter = stop_filter = _refuse
 

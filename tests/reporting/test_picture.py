@@ -219,7 +219,7 @@ def test_tex_and_filters_are_refused():
     figure, axes = new_figure()
     (line,) = axes.plot([0, 1])
     line.set_agg_filter(lambda image, dpi: (image, 0, 0))
-    with pytest.raises(NotImplementedError, match="neither TeX nor filtered artists"):
+    with pytest.raises(ValueError, match="neither TeX nor filtered artists"):
         Recording.of(figure, policy.DPI)
 
 
