@@ -51,3 +51,8 @@ def compiled_code_directory() -> Path:
     sources = (path.read_bytes() for path in sorted((ROOT / "soro_lib").rglob("*.py")))
     digest = hashlib.sha256(b"".join(source for source in sources if b"jit" in source)).hexdigest()
     return ROOT / "build" / "compiled" / digest[:16]
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -5,12 +5,11 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from soro_lib.project import ROOT
+from soro_lib.project import ROOT, cores
 from soro_lib.reporting import compare
 from soro_lib.reporting.tabular import TableError
 from soro_lib.workbook import golden
 from soro_lib.workbook.display import Display
-from soro_lib.workbook.execution import cores
 from soro_lib.workbook.generators import ROOMS, NothingToRun, generate
 from soro_lib.workbook.notebooks import (
     Notebook,

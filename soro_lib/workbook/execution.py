@@ -16,6 +16,7 @@ from papermill.clientwrap import PapermillNotebookClient
 from papermill.engines import NBClientEngine, papermill_engines
 from papermill.exceptions import PapermillExecutionError
 
+from soro_lib.project import cores
 from soro_lib.workbook.notebooks import Notebook
 
 THREAD_COUNTS = (
@@ -160,11 +161,6 @@ class Engine(NBClientEngine):
 
 
 papermill_engines.register(ENGINE, Engine)
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def kernel_environment(root: Path, output: Path, figures: Path, scratch: Path, jobs: int) -> dict[str, str]:

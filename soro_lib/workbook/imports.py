@@ -1,16 +1,22 @@
 """Which library modules a notebook depends on, read from the import statements without running them."""
 
 import ast
+import hashlib
+import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 PACKAGE = "soro_lib"
 
 
 TELLING = (ast.Import, ast.ImportFrom, ast.Attribute, ast.Constant, ast.keyword)
 """Parts of code that are looked at; most of a module is none of these."""
+LONGEST_SLUG = 60
+"""Characters; longer literals name no data folder."""
 
 
 def dependencies(sources: Iterable[str], root: Path) -> set[Path]:
@@ -35,7 +41,6 @@ def dependencies(sources: Iterable[str], root: Path) -> set[Path]:
     return found
 
 
-@cache
 def imported_names(source: str, package: str = "") -> frozenset[str]:
     """Return the dotted names of everything that code takes from the library.
 
@@ -49,23 +54,89 @@ def imported_names(source: str, package: str = "") -> frozenset[str]:
     package : str, optional
         Package that the module is in, to resolve relative imports.
     """
-    nodes = _nodes(source)
-    chains = {_chain(node) for node in nodes if isinstance(node, ast.Attribute)}
+    parsed = _parsed(source)
     names = set()
-    for bound, target in _bindings(nodes, package):
+    for bound, level, target in parsed["imports"]:
+        if level:
+            parents = package.split(".")[: len(package.split(".")) + 1 - level]
+            target = ".".join([*parents, target])
         if target.split(".")[0] == PACKAGE:
             names.add(target)
-            names |= {target + chain.removeprefix(bound) for chain in chains if chain.startswith(f"{bound}.")}
+            names |= {
+                target + chain.removeprefix(bound)
+                for chain in parsed["chains"]
+                if chain.startswith(f"{bound}.")
+            }
     return frozenset(names)
 
 
-@cache
 def texts(source: str) -> frozenset[str]:
     """Return the string literals of code, apart from the names of a lazily imported package."""
-    if _lazy_names(source):
-        return frozenset()
-    constants = (node.value for node in _nodes(source) if isinstance(node, ast.Constant))
-    return frozenset(value for value in constants if isinstance(value, str))
+    return frozenset(() if _lazy_names(source) else _parsed(source)["texts"])
+
+
+@contextmanager
+def remembered(path: Path) -> Iterator[None]:
+    """Take what modules that have not changed import from a file, and keep there what had to be parsed."""
+    try:
+        before = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        before = {}
+    _known.update(before)
+    yield
+    if _known.keys() != before.keys():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_suffix(".partial")
+        partial.write_text(json.dumps(_known), encoding="utf-8")
+        partial.replace(path)
+
+
+_known: dict[str, dict[str, Any]] = {}
+"""What `_parse` found in a source, by its digest."""
+
+
+def _parsed(source: str) -> dict[str, Any]:
+    digest = hashlib.sha256(source.encode()).hexdigest()
+    if digest not in _known:
+        _known[digest] = _parse(source)
+    return _known[digest]
+
+
+def _parse(source: str) -> dict[str, Any]:
+    """Return what code says about other code.
+
+    ``imports``: the name that is bound, dots of a relative import, dotted name it stands for; ``chains``:
+    dotted names that are used; ``texts``: string literals; ``lazy``: submodule per lazily imported name.
+    """
+    try:
+        tree = ast.parse(re.sub(r"^\s*[%!?].*$", "", source, flags=re.MULTILINE))
+    except SyntaxError:
+        tree = ast.Module([], [])  # It is the run that will fail, and say where.
+    nodes = [node for node in ast.walk(tree) if isinstance(node, TELLING)]
+    lazy = {}
+    for node in nodes:
+        if isinstance(node, ast.keyword) and node.arg == "submod_attrs":
+            modules = ast.literal_eval(node.value)
+            lazy = {name: module for module, names in modules.items() for name in names}
+    constants = {node.value for node in nodes if isinstance(node, ast.Constant)}
+    return {
+        "imports": list(_bindings(nodes)),
+        "chains": sorted({_chain(node) for node in nodes if isinstance(node, ast.Attribute)}),
+        "texts": sorted(value for value in constants if isinstance(value, str) and len(value) < LONGEST_SLUG),
+        "lazy": lazy,
+    }
+
+
+def _bindings(nodes: Iterable[ast.AST]) -> Iterator[tuple[str, int, str]]:
+    """Yield every imported name with the dots and the dotted name that it stands for."""
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.asname or alias.name, 0, alias.name
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                target = ".".join(filter(None, [node.module, alias.name]))
+                yield alias.asname or alias.name, node.level, target
 
 
 def _chain(node: ast.expr) -> str:
@@ -75,29 +146,6 @@ def _chain(node: ast.expr) -> str:
         names.append(node.attr)
         node = node.value
     return ".".join([node.id, *reversed(names)]) if isinstance(node, ast.Name) else ""
-
-
-@cache
-def _nodes(source: str) -> tuple[ast.AST, ...]:
-    """Return the parts of code that say what it takes: imports, dotted names, literals, keyword arguments."""
-    try:
-        tree = ast.parse(re.sub(r"^\s*[%!?].*$", "", source, flags=re.MULTILINE))
-    except SyntaxError:
-        return ()  # It is the run that will fail, and say where.
-    return tuple(node for node in ast.walk(tree) if isinstance(node, TELLING))
-
-
-def _bindings(nodes: Iterable[ast.AST], package: str) -> Iterable[tuple[str, str]]:
-    """Yield every imported name with the dotted name that it stands for."""
-    for node in nodes:
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield alias.asname or alias.name, alias.name
-        elif isinstance(node, ast.ImportFrom):
-            parents = package.split(".")[: len(package.split(".")) + 1 - node.level] if node.level else []
-            module = ".".join([*parents, *filter(None, [node.module])])
-            for alias in node.names:
-                yield alias.asname or alias.name, f"{module}.{alias.name}"
 
 
 def _files(dotted: str, root: Path) -> set[Path]:
@@ -120,8 +168,4 @@ def _files(dotted: str, root: Path) -> set[Path]:
 @cache
 def _lazy_names(init: str) -> dict[str, str]:
     """Return name -> submodule of the ``lazy_loader.attach`` call of a package, empty if it has none."""
-    for node in _nodes(init):
-        if isinstance(node, ast.keyword) and node.arg == "submod_attrs":
-            modules = ast.literal_eval(node.value)
-            return {name: module for module, names in modules.items() for name in names}
-    return {}
+    return dict(_parsed(init)["lazy"])

@@ -9,9 +9,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import lazy_loader
 import nbformat
-import papermill
 
+# Half a second to import, and a run without parameters does not ask for it.
+papermill = lazy_loader.load("papermill")
 # papermill announces every file that it opens.
 logging.getLogger("papermill").setLevel(logging.ERROR)
 

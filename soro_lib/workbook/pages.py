@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
-from nbconvert import HTMLExporter
-
 from soro_lib.workbook.display import VERDICTS
 from soro_lib.workbook.notebooks import Notebook
 from soro_lib.workbook.runner import Places
@@ -58,6 +56,8 @@ def _executed(notebook: Notebook, places: Places) -> Path:
 
 def _export_one(notebook: Notebook, places: Places, folder: Path) -> str:
     """Write one page and return its row of the index."""
+    from nbconvert import HTMLExporter  # half a second to import
+
     page = folder / f"{notebook.path.stem}.html"
     body, _ = HTMLExporter().from_filename(str(_executed(notebook, places)))
     page.parent.mkdir(parents=True, exist_ok=True)

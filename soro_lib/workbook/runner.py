@@ -12,14 +12,17 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from filelock import FileLock, Timeout
 
 from soro_lib.workbook.display import VERDICTS, Display, Outcome
-from soro_lib.workbook.execution import Execution, Interrupted, NotebookFailure, kernel_environment
+from soro_lib.workbook.imports import remembered
 from soro_lib.workbook.notebooks import OVERVIEW, Notebook
 from soro_lib.workbook.staleness import Record, current_inputs, current_outputs, stale_because
+
+if TYPE_CHECKING:
+    from soro_lib.workbook.execution import Execution
 
 
 class AlreadyRunning(RuntimeError):
@@ -97,7 +100,7 @@ class Run:
     force: bool = False
     cell_timeout: int | None = None
     display: Display = field(default_factory=Display)
-    _executions: dict[str, Execution] = field(default_factory=dict)
+    _executions: "dict[str, Execution]" = field(default_factory=dict)
 
     def start(self) -> list[Outcome]:
         """Run all that is stale and return how each notebook ended.
@@ -112,7 +115,7 @@ class Run:
         with _only_run(self.places.build), _stoppable():
             recover(self.places)
             try:
-                with self.display:
+                with self.display, remembered(self.places.build / "state" / "imports.json"):
                     outcomes = self._run_all([slug for slug in self.notebooks if slug != OVERVIEW])
                     # The overview reads the scorecards that the others have just written.
                     outcomes += self._run_all([slug for slug in self.notebooks if slug == OVERVIEW])
@@ -149,6 +152,9 @@ class Run:
         reason = stale_because(record, inputs, current_outputs(places.figures / slug))
         if record and not reason and not self.force:
             return Outcome(slug, "up to date", verdicts=record.verdicts)
+        # Half a second to import, and a run in which all is up to date does without.
+        from soro_lib.workbook.execution import Interrupted, NotebookFailure
+
         self.display.started(slug, sum(bool(code.strip()) for code in notebook.code), reason or "as asked")
         start = time.monotonic()
         try:
@@ -170,6 +176,8 @@ class Run:
 
     def _execute(self, notebook: Notebook, parameters: Mapping[str, Any]) -> Path:
         """Run a notebook in a fresh folder and return the folder that it has written."""
+        from soro_lib.workbook.execution import Execution, kernel_environment
+
         folder = self.places.staging / notebook.slug
         output, work = folder / "output", folder / "work"
         output.mkdir(parents=True)
