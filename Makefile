@@ -49,7 +49,7 @@ unchanged: figures ## say what this checkout does otherwise than its golden copy
 
 check: env ## lint, types, and whether what is committed is what the notebooks produce
 	@status=0; \
-	for step in "ruff check ." "ruff format --check ." mypy soro_lib.reporting.check; do \
+	for step in "ruff check ." "ruff format --check ." mypy soro_lib.workbook.check; do \
 	    $(RUN) $$step || status=1; \
 	done; \
 	exit $$status

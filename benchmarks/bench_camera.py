@@ -10,11 +10,11 @@ from benchmarks.run import Row, compare, seconds_per_call
 from soro_lib.estimators.extreme_learning_machine import ExtremeLearningMachine
 from soro_lib.estimators.pose_fusion import fuse_poses
 from soro_lib.estimators.visual_strain import VisualStrainEstimator
-from soro_lib.sensing.monocular_scene import ENDOSCOPE, BrickScene, ViewConditions, photograph
+from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import load_flight, start_tracker
+from soro_lib.papers.visual_strain_fusion.experiments.fusion_runs import camera_poses
+from soro_lib.papers.visual_strain_fusion.world.motion import glue_fibre, spiral
+from soro_lib.papers.visual_strain_fusion.world.scene import ENDOSCOPE, BrickScene, ViewConditions, photograph
 from soro_lib.sensing.monocular_vision import PointMap
-from soro_lib.studies.visual_strain_fusion.camera_runs import load_flight, start_tracker
-from soro_lib.studies.visual_strain_fusion.fusion_runs import camera_poses
-from soro_lib.studies.visual_strain_fusion.motion import glue_fibre, spiral
 
 PAPER_PERIOD_MS = 50.0
 """The paper's slowest rate, 20 Hz."""

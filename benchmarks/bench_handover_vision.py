@@ -11,12 +11,14 @@ import cv2
 import numpy as np
 
 from benchmarks.run import Row, compare, seconds_per_call
-from soro_lib.calibrations.soft_handover import plant_k
 from soro_lib.controllers.handover import HandoverController
-from soro_lib.sensing.handover_scene import STEREO, WEBCAM, HandoverScene, MarkerRing, photograph
-from soro_lib.sensing.rendered_observation import HandoverVision, RenderedObserver
+from soro_lib.papers.soft_handover.calibration import plant_k
+from soro_lib.papers.soft_handover.experiments.handover import Scene, thesis_parameters
+from soro_lib.papers.soft_handover.world.observer import RenderedObserver
+from soro_lib.papers.soft_handover.world.scene import STEREO, WEBCAM, HandoverScene, photograph
+from soro_lib.sensing.handover_vision import HandoverVision
+from soro_lib.sensing.marker_ring import MarkerRing
 from soro_lib.sensing.stereo_vision import BallDetector, CalibratedCamera, MarkerDetector, around
-from soro_lib.studies.soft_handover.handover import Scene, thesis_parameters
 
 CAMERAS = [CalibratedCamera(view.camera, view.pose) for view in STEREO]
 STEPS, HANDOVERS = 15, 4

@@ -17,22 +17,29 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.run import ROOT, Row, peak_memory
-from soro_lib.operators import NAIVE
-from soro_lib.studies.shared_control import simulation
-from soro_lib.studies.shared_control.demonstrations import (
+from soro_lib.papers.shared_control.experiments import simulation
+from soro_lib.papers.shared_control.experiments.demonstrations import (
     CELLS,
     RESULTS,
     demonstration_plans,
     run_demonstrations,
     summary,
 )
-from soro_lib.studies.shared_control.factorial import (
+from soro_lib.papers.shared_control.experiments.factorial import (
     RESPONSES,
     plain_anova,
     repeated_measures_anova,
     run_factorial,
 )
-from soro_lib.studies.shared_control.simulation import CHUNK, METRICS, TRACE, TrialPlan, play_trial, simulate
+from soro_lib.papers.shared_control.experiments.simulation import (
+    CHUNK,
+    METRICS,
+    TRACE,
+    TrialPlan,
+    play_trial,
+    simulate,
+)
+from soro_lib.papers.shared_control.world import NAIVE
 
 CORES = 2
 """Threads; the issue states its goals for two cores."""

@@ -11,17 +11,18 @@ import numpy as np
 from filterpy.kalman import KalmanFilter
 
 from benchmarks.run import Row, compare
-from soro_lib.calibrations.soft_handover import plant_k
 from soro_lib.controllers import VirtualStiffnessController
 from soro_lib.controllers.handover import HandoverController, Mode
 from soro_lib.controllers.virtual_stiffness import reach_goal, state_limits, step_towards
 from soro_lib.estimators import estimate_shape
 from soro_lib.estimators.handover_filters import MEASURED_NOISE, FilterNoise, HandoverFilters
 from soro_lib.estimators.shape_estimation import estimate_shape_by_slsqp
+from soro_lib.papers.soft_handover.calibration import plant_k
+from soro_lib.papers.soft_handover.experiments.handover import Scene, handovers, thesis_parameters
+from soro_lib.papers.soft_handover.world.observer import NoisyObserver, load_vision_noise
+from soro_lib.papers.soft_handover.world.plant import ElasticPlant
 from soro_lib.robots import HelixArm
-from soro_lib.robots.helix_plant import ElasticPlant
-from soro_lib.sensing.handover_observation import HandoverObservation, NoisyObserver, load_vision_noise
-from soro_lib.studies.soft_handover.handover import Scene, handovers, thesis_parameters
+from soro_lib.sensing.handover_observation import HandoverObservation
 
 ARM = HelixArm()
 CASES = 100

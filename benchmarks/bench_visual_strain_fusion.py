@@ -13,8 +13,8 @@ from benchmarks.run import Row, compare, seconds_per_call
 from soro_lib.estimators.extreme_learning_machine import ExtremeLearningMachine
 from soro_lib.estimators.gaussian_process import RollingGaussianProcess
 from soro_lib.estimators.pose_fusion import InverseVarianceFusion, blend_poses
-from soro_lib.studies.visual_strain_fusion.hybrid_control import READINGS, compare_controllers
-from soro_lib.studies.visual_strain_fusion.motion import glue_fibre, spiral
+from soro_lib.papers.visual_strain_fusion.experiments.hybrid_control import READINGS, compare_controllers
+from soro_lib.papers.visual_strain_fusion.world.motion import glue_fibre, spiral
 
 PERIOD_US = 5e4
 WINDOW = 100

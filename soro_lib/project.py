@@ -2,13 +2,24 @@
 
 import hashlib
 import os
+import tomllib
+from functools import cache
 from pathlib import Path
 
-SLUGS = ("gesture_steering", "shared_control", "visual_strain_fusion", "soft_handover")
-"""One short name per paper, the same in notebooks, data, figures, studies and tests."""
+from soro_lib.moved import old_names
 
 ROOT = Path(__file__).resolve().parent.parent
 """The checkout that this library is installed from."""
+
+
+@cache
+def slugs(root: Path = ROOT) -> tuple[str, ...]:
+    """Return the short name of every paper, the same in all folders, in the order of their cards' numbers.
+
+    A paper is a folder of ``data`` with a ``card.toml``.
+    """
+    cards = {path.parent.name: path.read_text(encoding="utf-8") for path in root.glob("data/*/card.toml")}
+    return tuple(sorted(cards, key=lambda slug: tomllib.loads(cards[slug])["number"]))
 
 
 def data_directory(slug: str) -> Path:
@@ -56,3 +67,6 @@ def compiled_code_directory() -> Path:
 def cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+__getattr__ = old_names(__name__)

@@ -58,9 +58,9 @@ def sweep() -> Sweep:
     """Sweep once for all tests that fly: the sweep takes longer than all that they do with it."""
     import numpy as np
 
-    from soro_lib.sensing.monocular_scene import BrickScene
-    from soro_lib.studies.visual_strain_fusion.camera_runs import FLIGHTS, start_tracker
-    from soro_lib.studies.visual_strain_fusion.record import SEED
+    from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import FLIGHTS, start_tracker
+    from soro_lib.papers.visual_strain_fusion.recordings import SEED
+    from soro_lib.papers.visual_strain_fusion.world.scene import BrickScene
 
     flight = FLIGHTS["scene1_light"]
     rng = np.random.default_rng([SEED, *flight.disturbance.encode()])

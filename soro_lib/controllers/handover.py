@@ -16,7 +16,7 @@ from soro_lib.estimators.handover_filters import APPENDIX_A, FilterParameters, H
 from soro_lib.estimators.shape_estimation import POSE_WEIGHTS, ShapeEstimate, estimate_shape
 from soro_lib.poses import magnitude
 from soro_lib.robots.helix_kernels import tip_points
-from soro_lib.robots.helix_plant import TendonMotors
+from soro_lib.robots.helix_motors import TendonMotors
 from soro_lib.sensing.handover_observation import HandoverObservation
 
 UP = np.array([0.0, 0.0, -1.0])

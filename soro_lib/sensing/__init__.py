@@ -1,15 +1,16 @@
-"""What the robots and their operators are seen and felt with: hand tracking, fibre gratings, cameras."""
+"""How robots and hands are seen: hand tracking, cameras, markers. What they look at is in ``worlds``."""
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
+from soro_lib.moved import old_names
+
+_present, __dir__, __all__ = lazy_loader.attach(
     __name__,
     submod_attrs={
-        "fibre": ["FibreGratings"],
+        "camera": ["Camera"],
         "hand_tracking": ["HandSample", "hand_samples", "load_hand_recording"],
         "monocular_vision": ["MonocularTracker", "fit_similarity"],
-        "rendering": ["Camera", "Photometry", "Polygon", "TexturedQuad", "expose", "render"],
-        "round_bodies": ["Sphere", "Tube"],
         "stereo_vision": ["triangulate"],
     },
 )
+__getattr__ = old_names(__name__, _present)

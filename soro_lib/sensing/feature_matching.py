@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from soro_lib.sensing.rendering import Camera
+from soro_lib.sensing.camera import Camera
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

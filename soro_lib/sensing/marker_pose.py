@@ -9,7 +9,7 @@ camera). The estimators differ in how they live with that:
 - :func:`joint_pose`: one rigid ring fitted to all corners of all cameras.
 
 The world is the frame `arm_base`; the wrist frame is that of
-:class:`soro_lib.sensing.handover_scene.MarkerRing`.
+:class:`soro_lib.sensing.marker_ring.MarkerRing`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from soro_lib.sensing.handover_scene import MarkerRing
+from soro_lib.sensing.marker_ring import MarkerRing
 from soro_lib.sensing.stereo_vision import CalibratedCamera
 
 Markers = Mapping[int, NDArray[np.float64]]

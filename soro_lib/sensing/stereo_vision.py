@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.sensing.handover_scene import MarkerRing
-from soro_lib.sensing.rendering import Camera, Image, invert_pose, transform_points
+from soro_lib.sensing.camera import Camera, Image, invert_pose, transform_points
+from soro_lib.sensing.marker_ring import MarkerRing
 
 Window = tuple[slice, slice]
 """Rows and columns of an image."""

@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from soro_lib.project import ROOT, cores
-from soro_lib.reporting import compare
-from soro_lib.reporting.tabular import TableError
-from soro_lib.workbook import golden
+from soro_lib.replication.tabular import TableError
+from soro_lib.workbook import compare, golden
 from soro_lib.workbook.display import Display
-from soro_lib.workbook.generators import ROOMS, NothingToRun, generate
+from soro_lib.workbook.generators import FILES, NothingToRun, generate
 from soro_lib.workbook.notebooks import (
     Notebook,
     NotebookError,
@@ -154,7 +153,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     same = commands.add_parser("unchanged", help="say what this checkout does otherwise than its golden copy")
     make = commands.add_parser("generate", help="fit the plants or simulate the recordings again")
-    make.add_argument("kind", choices=list(ROOMS))
+    make.add_argument("kind", choices=list(FILES))
     make.add_argument("--small", action="store_true", help="all of the code, little of the data")
     for command in (run, html, differ, prints, same):
         command.add_argument("--quick", action="store_true", help="small parameters; in build/quick")

@@ -1,7 +1,7 @@
 """Runs what fits a plant or simulates recordings: ``python -m soro_lib.workbook generate calibrations``.
 
 A generator is a module that is run: it writes to ``data/<slug>``, or below another folder, in full or in its
-small form (`soro_lib.datacards.generator_options`).
+small form (`soro_lib.replication.datacards.generator_options`).
 """
 
 import re
@@ -9,10 +9,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-from soro_lib.project import ROOT, SLUGS
+from soro_lib.project import ROOT
 
-ROOMS = {"data": "soro_lib/studies", "calibrations": "soro_lib/calibrations"}
-"""Where the generators of each kind stand."""
+FILES = {"data": "recordings.py", "calibrations": "calibration.py"}
+"""Name of the generators of each kind in the papers' rooms."""
 
 
 class NothingToRun(LookupError):
@@ -27,16 +27,13 @@ def generators(kind: str, root: Path = ROOT) -> dict[str, str]:
     NothingToRun
         If there is none: their folder has been moved, or none can be run as a module any more.
     """
-    room = root / ROOMS[kind]
-    sources = {path: path.read_text(encoding="utf-8") for path in sorted(room.rglob("*.py"))}
+    rooms = root / "soro_lib" / "papers"
     found = {}
-    for path, source in sources.items():
-        if re.search(r'^if __name__ == "__main__":', source, re.MULTILINE):
-            parts = path.relative_to(root).with_suffix("").parts
-            module = ".".join(part for part in parts if part != "__main__")
-            found[module] = next(slug for slug in SLUGS if slug in parts)
+    for path in sorted(rooms.glob(f"*/{FILES[kind]}")):
+        if re.search(r'^if __name__ == "__main__":', path.read_text(encoding="utf-8"), re.MULTILINE):
+            found[".".join(path.relative_to(root).with_suffix("").parts)] = path.parent.name
     if not found:
-        raise NothingToRun(f"nothing to run for {kind} in {room}; has it been moved?")
+        raise NothingToRun(f"nothing to run for {kind} in {rooms}; has it been moved?")
     return found
 
 

@@ -21,9 +21,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from soro_lib.project import ROOT
-from soro_lib.reporting import compare
-from soro_lib.reporting.tabular import read_rows
-from soro_lib.workbook.generators import ROOMS
+from soro_lib.replication.tabular import read_rows
+from soro_lib.workbook import compare
+from soro_lib.workbook.generators import FILES
 from soro_lib.workbook.notebooks import find_notebooks
 
 STATED = ROOT / "tests" / "golden"
@@ -82,7 +82,7 @@ def build(reference: str, root: Path = ROOT, benchmark_runs: int = BENCHMARK_RUN
                 raise GoldenError(f"the notebooks of {reference} fail; see above")
         _write_lines(partial / "tests.txt", collected_tests(tree, python))
         _write_lines(partial / "imports.txt", imported_names(tree))
-        for kind in ROOMS:
+        for kind in FILES:
             _say(f"{folder.name}: {kind}, small form")
             output = ["--output", str(partial / "small" / kind)]
             if _run(tree, python, "-m", "soro_lib.workbook", "generate", kind, "--small", *output):
@@ -211,7 +211,7 @@ def _changed_data(golden: Path, again: Path) -> list[str]:
     """Make the small form of data and calibrations again and compare it byte by byte."""
     shutil.rmtree(again, ignore_errors=True)
     problems = []
-    for kind in ROOMS:
+    for kind in FILES:
         if not (golden / kind).is_dir():
             continue
         output = ["--output", str(again / kind)]

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from soro_lib.studies.shared_control.task import Scene
-from soro_lib.studies.shared_control.trials import load_trial, load_trials, standing, trial_table
+from soro_lib.papers.shared_control.experiments.task import Scene
+from soro_lib.papers.shared_control.experiments.trials import load_trial, load_trials, standing, trial_table
 
 pytestmark = pytest.mark.browser
 

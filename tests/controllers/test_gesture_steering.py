@@ -15,13 +15,18 @@ from soro_lib.controllers.gestures import Mode
 from soro_lib.controllers.hand_mapping import PalmMapping
 from soro_lib.controllers.obstacles import Sphere, smallest_clearance
 from soro_lib.controllers.steering_step import Step, StepWeights
+from soro_lib.papers.gesture_steering.experiments import robustness
+from soro_lib.papers.gesture_steering.experiments.robustness import (
+    FAULTS,
+    mode_changes,
+    run_with_fault,
+    tip_speeds,
+)
 from soro_lib.project import ROOT
 from soro_lib.robots import CableDrivenArm, PneumaticArm
 from soro_lib.robots.cable_driven_kernels import generic_kinematics
 from soro_lib.sensing import load_hand_recording
 from soro_lib.sensing.hand_tracking import HandSample, hand_samples
-from soro_lib.studies.gesture_steering import robustness
-from soro_lib.studies.gesture_steering.robustness import FAULTS, mode_changes, run_with_fault, tip_speeds
 
 REAL = ROOT.parent / "shared" / "recordings"
 ARM = CableDrivenArm()

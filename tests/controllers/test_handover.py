@@ -14,9 +14,11 @@ from soro_lib.controllers.handover import (
     softened_weights,
 )
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController, within_limits
+from soro_lib.papers.soft_handover.world.observer import NO_NOISE, NoisyObserver
+from soro_lib.papers.soft_handover.world.plant import AngleLossPlant
 from soro_lib.robots import HelixArm
-from soro_lib.robots.helix_plant import AngleLossPlant, TendonMotors
-from soro_lib.sensing.handover_observation import NO_NOISE, HandoverObservation, NoisyObserver
+from soro_lib.robots.helix_motors import TendonMotors
+from soro_lib.sensing.handover_observation import HandoverObservation
 
 ARM = HelixArm()
 BALL = np.array([0.15, 0.0, 0.64])

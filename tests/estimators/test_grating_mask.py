@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from soro_lib.estimators.grating_mask import GratingMask
-from soro_lib.studies.visual_strain_fusion.motion import glue_fibre, spiral
+from soro_lib.papers.visual_strain_fusion.world.motion import glue_fibre, spiral
 
 NOISE = 1.137e-12
 

@@ -5,7 +5,7 @@ import pytest
 
 from soro_lib.estimators.extreme_learning_machine import ExtremeLearningMachine
 from soro_lib.estimators.visual_strain import VisualStrainEstimator, VisualStrainSettings
-from soro_lib.studies.visual_strain_fusion.motion import glue_fibre, spiral
+from soro_lib.papers.visual_strain_fusion.world.motion import glue_fibre, spiral
 
 STEPS = 1200
 

@@ -14,9 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from soro_lib.project import ROOT, SLUGS
-from soro_lib.reporting import compare
-from soro_lib.workbook import execution
+from soro_lib.project import ROOT, slugs
+from soro_lib.workbook import compare, execution
 from soro_lib.workbook.__main__ import main
 from soro_lib.workbook.display import VERDICTS
 from soro_lib.workbook.notebooks import OVERVIEW, find_notebooks
@@ -66,7 +65,7 @@ def test_notebook_runs_with_small_parameters(
     monkeypatch.setenv(KERNEL, OLD)  # not the one of `make figures`
     run(slug, tmp_path)
     assert list((tmp_path / slug).glob("*.png")), "a notebook without a figure"
-    if slug in SLUGS:
+    if slug in slugs():
         verdicts = count_verdicts(tmp_path / slug / "scorecard.csv")
         assert verdicts
         assert set(verdicts) <= set(VERDICTS)

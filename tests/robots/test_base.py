@@ -8,14 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from soro_lib.arcs import chain_transform
-from soro_lib.robots import (
-    ActuationError,
-    CableDrivenArm,
-    HelixArm,
-    PneumaticArm,
-    Robot,
-    SoftGrowingArm,
-)
+from soro_lib.robots import ActuationError, CableDrivenArm, HelixArm, PneumaticArm, Robot, SoftGrowingArm
 
 ARMS = {
     "cable_driven": CableDrivenArm(),

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from soro_lib.robots import HelixArm
-from soro_lib.sensing.handover_observation import (
+from soro_lib.papers.soft_handover.world.observer import (
     NO_NOISE,
-    HandoverObservation,
     NoisyObserver,
     VisionNoise,
     load_vision_noise,
 )
+from soro_lib.robots import HelixArm
+from soro_lib.sensing.handover_observation import HandoverObservation
 
 ARM = HelixArm()
 BALL = np.array([0.15, 0.0, 0.64])

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import metric_pose, start_tracker
+from soro_lib.papers.visual_strain_fusion.world.motion import move
+from soro_lib.papers.visual_strain_fusion.world.scene import ENDOSCOPE, BrickScene, ViewConditions, photograph
 from soro_lib.sensing.feature_matching import Features, match_descriptors, match_near
-from soro_lib.sensing.monocular_scene import ENDOSCOPE, BrickScene, ViewConditions, photograph
 from soro_lib.sensing.monocular_vision import MonocularTracker, TrackerSettings, fit_similarity
-from soro_lib.studies.visual_strain_fusion.camera_runs import metric_pose, start_tracker
-from soro_lib.studies.visual_strain_fusion.motion import move
 
 HELD_OUT = BrickScene(4)
 """A room in which no setting was chosen."""

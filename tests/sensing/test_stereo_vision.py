@@ -6,17 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from soro_lib.sensing import triangulate
-from soro_lib.sensing.handover_scene import (
+from soro_lib.papers.soft_handover.world.scene import (
     BRIO,
     SIDE_CAMERA,
     STEREO,
     WEBCAM,
     Extras,
     HandoverScene,
-    MarkerRing,
     photograph,
 )
+from soro_lib.sensing import triangulate
+from soro_lib.sensing.camera import transform_points
 from soro_lib.sensing.marker_pose import (
     average_pose,
     consensus_pose,
@@ -24,7 +24,7 @@ from soro_lib.sensing.marker_pose import (
     viewing_cosines,
     wrist_candidates,
 )
-from soro_lib.sensing.rendering import transform_points
+from soro_lib.sensing.marker_ring import MarkerRing
 from soro_lib.sensing.stereo_vision import (
     BallDetector,
     CalibratedCamera,

@@ -84,13 +84,12 @@ def test_every_generator_takes_the_small_form_and_a_folder():
         "visual_strain_fusion",
     }
     for module in found:
-        path = ROOT.joinpath(*module.split("."))
-        source = (path / "__main__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
+        source = ROOT.joinpath(*module.split(".")).with_suffix(".py").read_text()
         assert "generator_options(" in source, module
 
 
 def test_generators_that_cannot_be_found_are_told(tmp_path: Path):
-    (tmp_path / "soro_lib" / "studies").mkdir(parents=True)
-    (tmp_path / "soro_lib" / "studies" / "paper.py").write_text("x = 1\n")
+    (tmp_path / "soro_lib" / "papers" / "some").mkdir(parents=True)
+    (tmp_path / "soro_lib" / "papers" / "some" / "recordings.py").write_text("x = 1\n")
     with pytest.raises(NothingToRun, match="nothing to run for data in "):
         generators("data", tmp_path)

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from soro_lib.controllers.shared_control.checks import not_negative, positive, sample_count, vector
+from soro_lib.checks import not_negative, positive, sample_count, vector
 from soro_lib.controllers.shared_control.guidance import (
     Guidance,
     distance_to_goal,

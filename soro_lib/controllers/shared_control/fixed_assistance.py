@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.controllers.shared_control.checks import not_negative, positive, sample_count, vector
+from soro_lib.checks import not_negative, positive, sample_count, vector
 from soro_lib.controllers.shared_control.guidance import (
     Guidance,
     damped_magnitude,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.controllers.shared_control.checks import Vector, goal_points, positive, vector
+from soro_lib.checks import Vector, goal_points, positive, vector
 from soro_lib.jit import inlined
 
 PHASES = ("start", "grasping", "lifting with item", "placing", "lifting empty", "end")

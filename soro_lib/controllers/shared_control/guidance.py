@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soro_lib.controllers.shared_control.checks import Vector
+from soro_lib.checks import Vector
 from soro_lib.jit import inlined
 
 

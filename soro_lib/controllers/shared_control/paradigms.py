@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from soro_lib.controllers.shared_control.checks import Vector, finite_vector
+from soro_lib.checks import Vector, finite_vector
 from soro_lib.jit import inlined
 
 ASSISTANCES = ("none", "as needed", "fixed")

@@ -1,0 +1,1 @@
+"""Every controller on every arm: the same path, the same disturbance, only the `Robot` interface between."""

@@ -1,0 +1,1 @@
+"""The simulated hand and the simulated arm of the gesture-steering paper."""

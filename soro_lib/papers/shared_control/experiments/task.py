@@ -1,0 +1,518 @@
+"""The pick-and-place task, one sample at a time: gripper, goal machine, assistance, arm, and the metrics.
+
+`task_step` is the only place where the parts of a trial are put together. `Trial` calls it for a hand from
+outside, the simulator for a simulated operator.
+
+Source: Stroppa et al., Sections 3 to 5.1; the scene is that of the authors' published simulator.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from soro_lib.checks import Vector, vector
+from soro_lib.controllers.shared_control.assist_as_needed import (
+    ASSIST_START,
+    MOTIONS,
+    AssistAsNeeded,
+    AssistRule,
+    AssistState,
+    assist_step,
+)
+from soro_lib.controllers.shared_control.fixed_assistance import (
+    FIXED_START,
+    FixedAssistance,
+    FixedRule,
+    FixedState,
+    fixed_step,
+)
+from soro_lib.controllers.shared_control.goal_selection import (
+    END,
+    LIFTING_EMPTY,
+    PHASES,
+    PLACING,
+    GoalRule,
+    GoalSelection,
+    GoalState,
+    goal_step,
+)
+from soro_lib.controllers.shared_control.guidance import distance_to_goal, guidance_force, hooke_magnitude
+from soro_lib.controllers.shared_control.paradigms import ASSISTANCES, PARADIGMS, Paradigm, desired_position
+from soro_lib.jit import inlined
+from soro_lib.papers.shared_control.world.plant import (
+    NOTHING,
+    REAL_GRIPPER,
+    SAMPLE_TIME,
+    SIMULATED_GRIPPER,
+    GripperRule,
+    GripperState,
+    PlantParameters,
+    PlantRule,
+    PlantState,
+    command_buffer,
+    gripper_step,
+    plant_start,
+    plant_step,
+    real_arm,
+    tracked_tip,
+)
+
+UNASSISTED, AS_NEEDED, FIXED = range(len(ASSISTANCES))
+
+AUTOMATIC_LAG = 0.19
+"""Lag with which an automatic axis takes up its goal [s]: 5 % of the gap per 10 ms, as programmed."""
+
+
+# --- What is fixed during a trial ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Where things lie [m], base frame, z down; the defaults are those of the authors' simulator.
+
+    Parameters
+    ----------
+    start : tuple of float
+        Tip at the start.
+    items, targets : tuple of tuple of float
+        Centres of the cubes and of the discs where they belong, in the order of the task.
+    """
+
+    start: Vector = (0.0, 0.0, 0.1)
+    items: tuple[Vector, ...] = ((-0.095, 0.117, 0.645), (-0.103, -0.175, 0.645))
+    targets: tuple[Vector, ...] = ((0.400, -0.170, 0.643), (0.400, 0.110, 0.643))
+
+
+@dataclass(frozen=True)
+class TaskSettings:
+    """A trial before it begins: who steers what, with which law, arm and scene.
+
+    Parameters
+    ----------
+    paradigm : Paradigm
+        One of ``PARADIGMS``, or a blend of your own.
+    environment : {"simulated", "real"}
+        Which arm and gripper.
+    force_law : {"printed", "program"}
+        Unit direction and th_D = 30 mm as printed; or the authors' program: direction not normalised, th_D =
+        50 mm, its own counter tau, fixed assistance without damper and silent below 30 mm.
+    assist_as_needed, fixed_assistance : mapping
+        Parameters that differ from the defaults of `AssistAsNeeded` and `FixedAssistance`.
+    scene : Scene
+    detection_error : tuple of float
+        Error of the goals that the machine is told, added to items and targets alike [m].
+    lift : bool or None
+        Whether the machine lifts between goals; None: as the paradigm does.
+    printed_goal_machine : bool
+        Without the mends of `GoalSelection`.
+    tracking_noise : float or None
+        Of the real arm's tracked tip [m]; None: as in `real_arm`.
+    """
+
+    paradigm: Paradigm = PARADIGMS["full_teleoperation"]
+    environment: Literal["simulated", "real"] = "simulated"
+    force_law: Literal["printed", "program"] = "printed"
+    assist_as_needed: dict[str, object] = field(default_factory=dict)
+    fixed_assistance: dict[str, object] = field(default_factory=dict)
+    scene: Scene = Scene()
+    detection_error: Vector = (0.0, 0.0, 0.0)
+    lift: bool | None = None
+    printed_goal_machine: bool = False
+    tracking_noise: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.environment not in ("simulated", "real"):
+            raise ValueError(f'environment must be "simulated" or "real", got {self.environment!r}')
+        if self.force_law not in ("printed", "program"):
+            raise ValueError(f'force_law must be "printed" or "program", got {self.force_law!r}')
+
+    def rule(self) -> "TaskRule":
+        """Plain numbers for the compiled rules.
+
+        Raises
+        ------
+        ValueError
+            If a parameter is out of bounds or a goal out of reach.
+        """
+        program = self.force_law == "program"
+        as_needed = {"near_distance": 0.05, "counter": "program"} if program else {}
+        fixed = {"near_distance": 0.03, "damping": 0.0} if program else {}
+        assist = AssistAsNeeded(**{**as_needed, **self.assist_as_needed})  # type: ignore[arg-type]
+        spring = FixedAssistance(**{**fixed, **self.fixed_assistance})  # type: ignore[arg-type]
+        real = self.environment == "real"
+        plant = real_arm(self.tracking_noise) if real else PlantParameters()
+        error = np.array(vector("detection_error", self.detection_error))
+        goals = GoalSelection(
+            np.array(self.scene.items) + error,
+            np.array(self.scene.targets) + error,
+            lift=self.paradigm.lifts if self.lift is None else self.lift,
+            reach=plant.maximum_length,
+            printed=self.printed_goal_machine,
+        )
+        return TaskRule(
+            goals=goals.rule,
+            items=self.scene.items,
+            targets=self.scene.targets,
+            assist=assist.rule,
+            assist_maximum=assist.maximum_force,
+            fixed=spring.rule,
+            window=len(spring.window),
+            plant=plant.rule(),
+            gripper=REAL_GRIPPER if real else SIMULATED_GRIPPER,
+            assistance=ASSISTANCES.index(self.paradigm.assistance),
+            automation=vector("automation", self.paradigm.automation),
+            unit_direction=not program,
+            confirmed_by_hand=real,
+        )
+
+
+class TaskRule(NamedTuple):
+    """What stays fixed during a trial; ``goals`` are as detected, ``items`` and ``targets`` as they are."""
+
+    goals: GoalRule
+    items: tuple[Vector, ...]
+    targets: tuple[Vector, ...]
+    assist: AssistRule
+    assist_maximum: float
+    fixed: FixedRule
+    window: int
+    plant: PlantRule
+    gripper: GripperRule
+    assistance: int
+    automation: Vector
+    unit_direction: bool
+    confirmed_by_hand: bool
+
+
+# --- What changes --------------------------------------------------------------------------------------
+
+
+class TaskMemory(NamedTuple):
+    """Arrays that a trial overwrites: filter window, commands on their way, items (n, 3), releases (n, 4).
+
+    A row of ``releases`` holds time [s], distance of the tip from its target when the gripper was opened and
+    of the item from its target when it fell [m] (both horizontal), and time of the grasp [s].
+    """
+
+    window: NDArray[np.float64]
+    delayed: NDArray[np.float64]
+    items: NDArray[np.float64]
+    releases: NDArray[np.float64]
+
+
+class Tally(NamedTuple):
+    """Running metrics: path length [m], integral and peak of the force [N s, N], horizontal tip error [m]."""
+
+    path: float
+    impulse: float
+    peak_force: float
+    opening_error: float
+
+
+class TaskState(NamedTuple):
+    """A trial between two samples."""
+
+    sample: int
+    goal: GoalState
+    assist: AssistState
+    fixed: FixedState
+    plant: PlantState
+    gripper: GripperState
+    automatic: Vector
+    desired: Vector
+    force: Vector
+    magnitude: float
+    closed: bool
+    tally: Tally
+
+
+def task_memory(rule: TaskRule, scene: Scene) -> TaskMemory:
+    """Fresh arrays for one trial."""
+    return TaskMemory(
+        window=np.zeros(rule.window),
+        delayed=command_buffer(rule.plant, scene.start),
+        items=np.array(scene.items, dtype=float),
+        releases=np.full((len(scene.items), 4), np.nan),
+    )
+
+
+def task_start(rule: TaskRule, start: Vector) -> TaskState:
+    """A trial before its first sample: tip at rest, gripper open, no force."""
+    zero = (0.0, 0.0, 0.0)
+    first = rule.goals.items[0]
+    return TaskState(
+        sample=0,
+        goal=GoalState(0, 0, first, first),
+        assist=ASSIST_START,
+        fixed=FIXED_START,
+        plant=plant_start(start),
+        gripper=GripperState(NOTHING, -1.0),
+        automatic=start,
+        desired=start,
+        force=zero,
+        magnitude=0.0,
+        closed=False,
+        tally=Tally(0.0, 0.0, 0.0, math.nan),
+    )
+
+
+# --- One sample ----------------------------------------------------------------------------------------
+
+
+@inlined
+def horizontal(a: Vector, b: Vector) -> float:
+    """Distance of two points in the x-y plane [m]."""
+    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2)
+
+
+@inlined
+def carry(rule: TaskRule, items: NDArray[np.float64], before: int, after: int, tip: Vector) -> None:
+    """Move the held item with the tip; a released one falls straight down to where it lay."""
+    moved = after if after != NOTHING else before
+    if moved != NOTHING:
+        items[moved, 0], items[moved, 1] = tip[0], tip[1]
+        items[moved, 2] = tip[2] if after != NOTHING else rule.items[moved][2]
+
+
+@inlined
+def assist(
+    rule: TaskRule,
+    assisted: AssistState,
+    fixed: FixedState,
+    window: NDArray[np.float64],
+    tip: Vector,
+    goal: Vector,
+) -> tuple[AssistState, FixedState, float, Vector]:
+    """The assistance of the paradigm: its states, |f| and the rendered force [N]."""
+    distance = distance_to_goal(tip, goal)
+    if rule.assistance == AS_NEEDED:
+        assisted = assist_step(rule.assist, assisted, distance, 1.0)
+        magnitude = hooke_magnitude(assisted.stiffness, distance, rule.assist_maximum)
+    else:
+        fixed = fixed_step(rule.fixed, fixed, window, distance, 1.0)
+        magnitude = fixed.magnitude
+    return assisted, fixed, magnitude, guidance_force(magnitude, tip, goal, rule.unit_direction)
+
+
+@inlined
+def approach_goal(automatic: Vector, goal: Vector) -> Vector:
+    """Let the automatic command close in on the goal, as the authors' program does."""
+    share = SAMPLE_TIME / (AUTOMATIC_LAG + SAMPLE_TIME)
+    return (
+        automatic[0] + share * (goal[0] - automatic[0]),
+        automatic[1] + share * (goal[1] - automatic[1]),
+        automatic[2] + share * (goal[2] - automatic[2]),
+    )
+
+
+@inlined
+def task_step(
+    rule: TaskRule,
+    state: TaskState,
+    memory: TaskMemory,
+    command: Vector,
+    closed: bool,
+    confirmed: bool,
+    rng: np.random.Generator,
+) -> TaskState:
+    """One sample of a trial: blend, move, grip, select the goal, assist, and keep the score.
+
+    ``closed``: the gripper's button is held. ``confirmed``: the operator reports an item in the gripper (the
+    second button); heeded by the real variant, which cannot sense it.
+    """
+    automatic = approach_goal(state.automatic, state.goal.goal)
+    desired = desired_position(command, automatic, rule.automation)
+    plant = plant_step(rule.plant, state.plant, memory.delayed, desired)
+    tip = plant.tip
+    time = SAMPLE_TIME * (state.sample + 1)
+
+    opening_error = state.tally.opening_error
+    item = state.gripper.item
+    if item != NOTHING and state.closed and not closed:
+        opening_error = horizontal(tip, rule.targets[item])
+    gripper = state.gripper
+    if closed or item != NOTHING:
+        gripper = gripper_step(rule.gripper, gripper, memory.items, tip, desired, closed, rng)
+        carry(rule, memory.items, item, gripper.item, tip)
+    if item == NOTHING and gripper.item != NOTHING:
+        memory.releases[gripper.item, 3] = time
+    elif item != NOTHING and gripper.item == NOTHING and state.goal.phase == PLACING:
+        memory.releases[item, 0] = time
+        memory.releases[item, 1] = opening_error
+        memory.releases[item, 2] = horizontal(tip, rule.targets[item])
+
+    tracked = tracked_tip(tip, rule.plant.tracking_noise, rng)
+    held = confirmed if rule.confirmed_by_hand else gripper.item != NOTHING
+    goal = goal_step(rule.goals, state.goal, tracked, held)
+    assisted, fixed, magnitude, force = state.assist, state.fixed, 0.0, (0.0, 0.0, 0.0)
+    if rule.assistance != UNASSISTED:
+        assisted, fixed, magnitude, force = assist(rule, assisted, fixed, memory.window, tracked, goal.goal)
+
+    size = distance_to_goal((0.0, 0.0, 0.0), force)
+    tally = Tally(
+        path=state.tally.path + distance_to_goal(tip, state.plant.tip),
+        impulse=state.tally.impulse + SAMPLE_TIME * size,
+        peak_force=max(state.tally.peak_force, size),
+        opening_error=opening_error,
+    )
+    return TaskState(
+        sample=state.sample + 1,
+        goal=goal,
+        assist=assisted,
+        fixed=fixed,
+        plant=plant,
+        gripper=gripper,
+        automatic=automatic,
+        desired=desired,
+        force=force,
+        magnitude=magnitude,
+        closed=closed,
+        tally=tally,
+    )
+
+
+@inlined
+def delivered(rule: TaskRule, state: TaskState) -> bool:
+    """Whether the last item has been released on its target."""
+    last = state.goal.item >= len(rule.goals.items) - 1
+    return state.goal.phase == END or (last and state.goal.phase == LIFTING_EMPTY)
+
+
+# --- The task for a hand from outside ------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One sample of a trial, for display and recording.
+
+    Attributes
+    ----------
+    time : float
+        [s].
+    tip, desired, goal, force : numpy.ndarray
+        (3,) end-effector, desired position and goal [m], force on the hand [N], base frame.
+    stiffness, magnitude : float
+        Of the assistance [N/m, N].
+    motion, phase : str
+        States of Fig. 5 and Fig. 4.
+    item : int
+        Item held, -1 for none.
+    items : numpy.ndarray
+        (n, 3) centres of the items [m].
+    done : bool
+        The last item has been placed.
+    held_command : bool
+        The command was not a number; the last good one was used.
+    """
+
+    time: float
+    tip: NDArray[np.float64]
+    desired: NDArray[np.float64]
+    goal: NDArray[np.float64]
+    force: NDArray[np.float64]
+    stiffness: float
+    magnitude: float
+    motion: str
+    phase: str
+    item: int
+    items: NDArray[np.float64]
+    done: bool
+    held_command: bool
+
+
+class Trial:
+    """The task under one paradigm, driven by commands from outside, one per 10 ms.
+
+    Parameters
+    ----------
+    settings : TaskSettings
+    rng : numpy.random.Generator
+        For the real arm's tracker and gripper; the simulated ones draw nothing.
+
+    Raises
+    ------
+    ValueError
+        If the settings are out of bounds or a goal is out of reach.
+
+    Examples
+    --------
+    >>> trial = Trial(TaskSettings(PARADIGMS["mostly_autonomous"]), np.random.default_rng(1))
+    >>> for _ in range(500):
+    ...     sample = trial.step((0.0, 0.0, 0.1), gripper_closed=False)
+    >>> sample.phase, bool(np.linalg.norm(sample.tip - sample.goal) < 0.01)
+    ('grasping', True)
+    """
+
+    def __init__(self, settings: TaskSettings, rng: np.random.Generator) -> None:
+        self.settings = settings
+        self.rng = rng
+        self.rule = settings.rule()
+        self.memory = task_memory(self.rule, settings.scene)
+        self.state = task_start(self.rule, settings.scene.start)
+        self.command: Vector = settings.scene.start
+
+    def step(self, command: ArrayLike, gripper_closed: bool, confirm: bool | None = None) -> Sample:
+        """Advance by one sample.
+
+        Parameters
+        ----------
+        command : array_like
+            (3,) position commanded by the device, base frame [m]. A sample that is not finite is replaced by
+            the last good one, and the result says so.
+        gripper_closed : bool
+            The gripper's button is held.
+        confirm : bool, optional
+            The operator reports an item in the gripper (real arm only); left out, the truth is reported.
+
+        Returns
+        -------
+        Sample
+
+        Raises
+        ------
+        ValueError
+            If the command has not three components.
+        """
+        given = np.asarray(command, dtype=float)
+        if given.shape != (3,):
+            raise ValueError(f"command must have shape (3,), got {given.shape}")
+        good = bool(np.all(np.isfinite(given)))
+        if good:
+            self.command = vector("command", given)
+        holding = self.state.gripper.item != NOTHING
+        confirmed = holding if confirm is None else bool(confirm)
+        self.state = task_step(
+            self.rule, self.state, self.memory, self.command, bool(gripper_closed), confirmed, self.rng
+        )
+        return self._sample(not good)
+
+    @property
+    def done(self) -> bool:
+        """Whether the last item has been placed."""
+        return delivered(self.rule, self.state)
+
+    def _sample(self, held_command: bool) -> Sample:
+        state = self.state
+        return Sample(
+            time=SAMPLE_TIME * state.sample,
+            tip=np.array(state.plant.tip),
+            desired=np.array(state.desired),
+            goal=np.array(state.goal.goal),
+            force=np.array(state.force),
+            stiffness=state.assist.stiffness
+            if self.rule.assistance == AS_NEEDED
+            else self._fixed_stiffness(),
+            magnitude=state.magnitude,
+            motion=MOTIONS[state.assist.motion],
+            phase=PHASES[state.goal.phase],
+            item=state.gripper.item,
+            items=self.memory.items.copy(),
+            done=self.done,
+            held_command=held_command,
+        )
+
+    def _fixed_stiffness(self) -> float:
+        return self.rule.fixed.stiffness if self.rule.assistance == FIXED else 0.0

@@ -1,0 +1,214 @@
+"""The format of recorded trials: one file each, a header of comment lines in TOML, then samples by time.
+
+    # soro_lib trial 1
+    # paradigm = "msae"
+    # environment = "simulated"
+    # ...
+    time_s,aim_x_m,...
+    0.01,0.0,...
+
+`HEADER` and `COLUMNS` document every entry. ``.csv`` (or ``.csv.gz``) is a trial that came to its end;
+``.csv.part`` is one that was cut off, by the operator or with the machine that recorded it.
+"""
+
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from soro_lib.checks import goal_points, positive, vector
+from soro_lib.controllers.shared_control import PARADIGMS
+from soro_lib.controllers.shared_control.assist_as_needed import MOTIONS
+from soro_lib.controllers.shared_control.goal_selection import PHASES
+from soro_lib.papers.shared_control.experiments.task import Scene, TaskSettings, Trial
+from soro_lib.papers.shared_control.world import EXPERT
+
+MAGIC = "# soro_lib trial 1"
+"""First line of every trial file; the number is that of the format."""
+
+SUFFIXES = (".csv", ".csv.gz", ".csv.part")
+"""Endings of trial files; the last is that of a trial that was cut off."""
+
+MAXIMUM_ROWS = 360_000
+"""Samples read at most: an hour at 100 Hz."""
+
+LARGEST = {"m": 5.0, "n": 100.0, "n_per_m": 10_000.0}
+"""Largest value believed, by unit: more is a file in other units."""
+
+HEADER = {
+    "paradigm": f"[-] one of {', '.join(PARADIGMS)}",
+    "environment": "[-] simulated or real: which arm and gripper",
+    "force_law": "[-] printed or program: which reading of the guidance force",
+    "operator": "[-] who was at the controls",
+    "kind": "[-] group of operators that the trial is shown with, such as expert, naive or own",
+    "view": "[-] above and front, or camera: what the operator saw of the task",
+    "seed": "[-] entropy of the arm's chance; empty for a trial that no simulator can replay",
+    "hand_stiffness_n_per_m": "[N/m] of the hand through which the force acts",
+    "start_m": "[m] tip at the start, base frame, z down",
+    "items_m": "[m] centres of the items, in the order of the task",
+    "targets_m": "[m] centres of their targets",
+}
+"""Entries of the header and their units; force_law, kind, view, seed and hand_stiffness_n_per_m may be left
+out."""
+
+AXES = ("x", "y", "z")
+
+VIEWS = ("above and front", "camera")
+"""What an operator may see of the task: two views that leave no doubt about depth, or one that does."""
+
+
+def _axes(name: str, unit: str, meaning: str) -> dict[str, str]:
+    return {f"{name}_{axis}_{unit.lower()}": f"[{unit}] {meaning}, {axis}" for axis in AXES}
+
+
+COLUMNS = {
+    "time_s": "[s] since the start, increasing, above 0",
+    **_axes("aim", "m", "where the operator's hand would command the tip to without any force"),
+    **_axes("command", "m", "where the hand does command the tip to: aim plus yield to the force, scaled"),
+    "gripper_closed": "[-] 1 while the gripper's button is held",
+    "confirmed": "[-] 1 while the operator reports an item in the gripper",
+    **_axes("tip", "m", "end-effector, base frame (z down)"),
+    **_axes("desired", "m", "where the arm is sent: command and goal, blended by the paradigm"),
+    **_axes("goal", "m", "current goal"),
+    **_axes("force", "N", "guidance force on the hand"),
+    "magnitude_n": "[N] |f| before the direction is applied",
+    "stiffness_n_per_m": "[N/m] stiffness k of the assistance",
+    "motion": f"[-] state of Fig. 5: {', '.join(MOTIONS)}",
+    "phase": f"[-] state of Fig. 4: {', '.join(PHASES)}",
+    "goal_item": "[-] number of the item that the goal machine is busy with, from 1",
+    "item_held": "[-] number of the item in the gripper, from 1; 0 for none",
+}
+"""Columns of a trial and their units; ``item<i>_x_m``, ``item<i>_y_m`` and ``item<i>_z_m`` follow, see
+`trial_columns`."""
+
+STATES = {"motion": MOTIONS, "phase": PHASES}
+
+
+class TrialError(ValueError):
+    """A trial file that cannot be used; the message names file, row, column and bound."""
+
+
+def trial_columns(items: int) -> dict[str, str]:
+    """Columns of a trial with so many items, with their meanings: `COLUMNS` and where each item is."""
+    places = [_axes(f"item{number}", "m", f"centre of item {number}") for number in range(1, items + 1)]
+    return COLUMNS | {name: meaning for place in places for name, meaning in place.items()}
+
+
+# --- The header -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TrialHeader:
+    """What stays fixed during a trial; the fields are those of `HEADER`, without units in their names.
+
+    Raises
+    ------
+    ValueError
+        If a field is out of bounds or a goal out of reach; the message names it.
+    """
+
+    paradigm: str
+    environment: str
+    operator: str
+    force_law: str = "printed"
+    kind: str = "own"
+    view: str = "camera"
+    seed: tuple[int, ...] = ()
+    hand_stiffness: float = EXPERT.hand_stiffness
+    scene: Scene = field(default_factory=Scene)
+
+    def __post_init__(self) -> None:
+        if self.paradigm not in PARADIGMS:
+            raise ValueError(f"paradigm must be one of {', '.join(PARADIGMS)}, got {self.paradigm!r}")
+        if self.view not in VIEWS:
+            raise ValueError(f"view must be one of {', '.join(VIEWS)}, got {self.view!r}")
+        positive("hand_stiffness_n_per_m", self.hand_stiffness)
+        for name in ("operator", "kind"):
+            if not getattr(self, name):
+                raise ValueError(f"{name} must not be empty")
+        self.settings().rule()
+
+    def settings(self) -> TaskSettings:
+        """The task as it was set."""
+        return TaskSettings(
+            PARADIGMS[self.paradigm],
+            environment=self.environment,  # type: ignore[arg-type]
+            force_law=self.force_law,  # type: ignore[arg-type]
+            scene=self.scene,
+        )
+
+    def task(self) -> Trial:
+        """The task before its first sample; what is left to chance depends on the seed alone."""
+        return Trial(self.settings(), np.random.default_rng(np.random.SeedSequence(self.seed)))
+
+    def text(self) -> str:
+        """The comment lines at the top of a trial file."""
+        values = {
+            "paradigm": self.paradigm,
+            "environment": self.environment,
+            "force_law": self.force_law,
+            "operator": self.operator,
+            "kind": self.kind,
+            "view": self.view,
+            "seed": self.seed,
+            "hand_stiffness_n_per_m": self.hand_stiffness,
+            "start_m": self.scene.start,
+            "items_m": self.scene.items,
+            "targets_m": self.scene.targets,
+        }
+        entries = [f"# {name} = {json.dumps(value, ensure_ascii=False)}" for name, value in values.items()]
+        return "\n".join([MAGIC, *entries]) + "\n"
+
+    @classmethod
+    def parse(cls, lines: Sequence[str]) -> "TrialHeader":
+        """Read the comment lines of a trial file.
+
+        Raises
+        ------
+        ValueError
+            If a line is no TOML, an entry is missing, unknown or out of bounds.
+        """
+        if not lines or lines[0].strip() != MAGIC:
+            raise ValueError(
+                f'the first line must be "{MAGIC}", got {lines[0].strip()[:60] if lines else ""!r}'
+            )
+        try:
+            values = tomllib.loads("\n".join(line.lstrip("#").strip() for line in lines[1:]))
+        except tomllib.TOMLDecodeError as error:
+            raise ValueError(f"the header is not TOML: {error}") from None
+        for name in values:
+            if name not in HEADER:
+                raise ValueError(f"unknown entry {name!r} in the header; known are {', '.join(HEADER)}")
+        for name, kind in ENTRY_TYPES.items():
+            if name in values and not isinstance(values[name], kind):
+                raise ValueError(f"{name} must be {HEADER[name]}, got {values[name]!r}")
+        missing = [name for name in HEADER if name not in values and name not in OPTIONAL_ENTRIES]
+        if missing:
+            raise ValueError(f"the header lacks {', '.join(missing)}")
+        scene = Scene(
+            start=vector("start_m", values["start_m"]),
+            items=goal_points("items_m", values["items_m"], LARGEST["m"]),
+            targets=goal_points("targets_m", values["targets_m"], LARGEST["m"]),
+        )
+        return cls(
+            paradigm=values["paradigm"],
+            environment=values["environment"],
+            operator=values["operator"],
+            force_law=values.get("force_law", "printed"),
+            kind=values.get("kind", "own"),
+            view=values.get("view", "camera"),
+            seed=tuple(values.get("seed", ())),
+            hand_stiffness=float(values.get("hand_stiffness_n_per_m", EXPERT.hand_stiffness)),
+            scene=scene,
+        )
+
+
+OPTIONAL_ENTRIES = ("force_law", "kind", "view", "seed", "hand_stiffness_n_per_m")
+ENTRY_TYPES: Mapping[str, Any] = {
+    **dict.fromkeys(("paradigm", "environment", "force_law", "operator", "kind", "view"), str),
+    **dict.fromkeys(("seed", "start_m", "items_m", "targets_m"), list),
+    "hand_stiffness_n_per_m": (int, float),
+}

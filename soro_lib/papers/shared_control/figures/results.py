@@ -1,0 +1,200 @@
+"""The demonstrations: Figs. 7, 8 and 9, and the claims over all conditions."""
+
+from collections.abc import Iterable
+from string import ascii_lowercase
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from soro_lib.controllers.shared_control import PARADIGMS
+from soro_lib.papers.shared_control.experiments.simulation import METRICS
+from soro_lib.replication.plotting import COLORS, SERIES, box_groups, label_axes, legend, new_figure
+
+SHORT = dict(zip(PARADIGMS, ("Full", "AAN", "Fixed", "MSAE", "ASME", "Auto"), strict=True))
+PARADIGM_COLORS = dict(zip(PARADIGMS, (COLORS["black"], *SERIES[:5]), strict=True))
+
+
+OWN = {
+    "linestyle": "none",
+    "marker": "*",
+    "markersize": 10,
+    "color": COLORS["vermillion"],
+    "markeredgecolor": "white",
+    "markeredgewidth": 0.6,
+    "zorder": 6,
+}
+"""A trial that somebody drove, over simulated ones."""
+
+
+def fig07a_placement_error(trials: pd.DataFrame, own: pd.DataFrame | None = None) -> Figure:
+    """Error at release by paradigm, one panel per participant or crowd (Fig. 7a).
+
+    Parameters
+    ----------
+    trials : pandas.DataFrame
+        Of `simulate`, or of `trial_table`.
+    own : pandas.DataFrame, optional
+        Of `trial_table`; finished trials are drawn as stars, into the panel of their environment and kind, or
+        of their environment alone where no panel has their kind.
+    """
+    return _boxes(trials, "release_error_mm", "placement error [mm]", own)
+
+
+def fig07b_time(trials: pd.DataFrame, own: pd.DataFrame | None = None) -> Figure:
+    """Time of a trial by paradigm, one panel per participant or crowd (Fig. 7b); ``own`` as in Fig. 7a."""
+    return _boxes(trials, "time_s", "time [s]", own)
+
+
+def _boxes(trials: pd.DataFrame, metric: str, label: str, own: pd.DataFrame | None) -> Figure:
+    cells = list(trials.groupby(["environment", "kind"], sort=False))
+    figure, grid = new_figure(height=3.0, columns=len(cells), sharey=True, squeeze=False)
+    for axes, ((environment, kind), cell) in zip(grid[0], cells, strict=True):
+        samples: dict[str, Any] = {
+            str(name): group[metric].dropna().to_numpy()
+            for name, group in cell.groupby("paradigm", sort=False)
+        }
+        box_groups(axes, samples, tuple(PARADIGM_COLORS[name] for name in samples))
+        axes.plot(
+            range(1, len(samples) + 1),
+            [values.mean() if len(values) else np.nan for values in samples.values()],
+            "D",
+            markersize=3.5,
+            color=COLORS["black"],
+            zorder=5,
+        )
+        mine = _finished(own, trials, (environment, kind), samples)
+        axes.plot([list(samples).index(name) + 1 for name in mine["paradigm"]], mine[metric], **OWN)
+        axes.set_xticklabels([SHORT[name] for name in samples])
+        axes.tick_params(axis="x", rotation=60)
+        label_axes(axes, title=f"{kind}, {environment}")
+    first = grid[0, 0]
+    if metric == "time_s":
+        first.set_yscale("log")
+        first.set_yticks([15, 20, 30, 50, 100, 200], [15, 20, 30, 50, 100, 200])
+        first.minorticks_off()
+    label_axes(first, y=label)
+    return figure
+
+
+def _finished(
+    own: pd.DataFrame | None, trials: pd.DataFrame, cell: tuple[Any, Any], paradigms: Iterable[str]
+) -> pd.DataFrame:
+    """The driven trials that belong into a panel: of its environment and kind, or of no kind shown."""
+    if own is None:
+        return pd.DataFrame(columns=["paradigm", *METRICS])
+    environment, kind = cell
+    fits = (own["environment"] == environment) & own["paradigm"].isin(list(paradigms))
+    fits &= (own["kind"] == kind) | ~own["kind"].isin(trials["kind"])
+    return own[fits & (own["finished"] == 1)]
+
+
+def fig08_error_against_time(trials: pd.DataFrame, own: pd.DataFrame | None = None) -> Figure:
+    """Error against time of single items, panels a to d (Fig. 8); ellipses hold half of each cloud.
+
+    ``own`` as in Fig. 7a, in the colours of the paradigms.
+    """
+    panels = list(trials.groupby(["environment", "kind"], sort=False))
+    rows, columns = -(-len(panels) // 2), min(len(panels), 2)
+    figure, grid = new_figure(
+        height=0.4 + 2.4 * rows, rows=rows, columns=columns, sharex=True, sharey=True, squeeze=False
+    )
+    for axes in grid.flat[len(panels) :]:
+        axes.set_visible(False)
+    for axes, letter, ((environment, kind), cell) in zip(grid.flat, ascii_lowercase, panels):
+        for name, group in cell.groupby("paradigm", sort=False):
+            _cloud(axes, *_items(group), PARADIGM_COLORS[str(name)], SHORT[str(name)])
+        for name, group in _finished(own, trials, (environment, kind), PARADIGM_COLORS).groupby("paradigm"):
+            axes.plot(*_items(group), **{**OWN, "color": PARADIGM_COLORS[str(name)], "markersize": 12})
+        axes.set(xscale="log", yscale="log")
+        axes.set_xticks([8, 10, 15, 20, 30, 50, 100], [8, 10, 15, 20, 30, 50, 100])
+        axes.set_yticks([0.3, 1, 3, 10, 30, 100], [0.3, 1, 3, 10, 30, 100])
+        axes.minorticks_off()
+        axes.set(xlim=(7, 120), ylim=(0.2, 200))
+        label_axes(axes, title=f"({letter}) {kind}, {environment}")
+    for axes in grid[-1]:
+        label_axes(axes, "time of one item [s]")
+    for axes in grid[:, 0]:
+        label_axes(axes, y="placement error [mm]")
+    legend(figure, ncols=6)
+    return figure
+
+
+def _items(trials: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Time and error of every item that was placed."""
+    times = trials[["item1_time_s", "item2_time_s"]].to_numpy().ravel()
+    errors = trials[["item1_error_mm", "item2_error_mm"]].to_numpy().ravel()
+    good = np.isfinite(times) & np.isfinite(errors)
+    return times[good], errors[good]
+
+
+def _cloud(axes: Axes, x: np.ndarray, y: np.ndarray, color: str, label: str) -> None:
+    """A cloud of points on logarithmic axes and the ellipse about half of it; a few points have none."""
+    points = np.log(np.column_stack([x, np.maximum(y, 0.05)]))
+    few = len(x) < 5
+    alpha = 1.0 if few else 0.5 if len(x) < 100 else 0.12
+    dots = axes.plot(x, y, ".", markersize=7 if few else 2.5, markeredgewidth=0, alpha=alpha, color=color)
+    if few:
+        dots[0].set_label(label)
+        return
+    values, vectors = np.linalg.eigh(np.cov(points.T))
+    angle = np.linspace(0, 2 * np.pi, 100)
+    circle = np.sqrt(2 * np.log(2)) * np.column_stack([np.cos(angle), np.sin(angle)])
+    ellipse = np.exp(np.median(points, axis=0) + circle * np.sqrt(np.maximum(values, 0)) @ vectors.T)
+    axes.plot(*ellipse.T, color=color, linewidth=1.6, label=label)
+
+
+def fig09_assistance(trials: pd.DataFrame, own: pd.DataFrame | None = None) -> Figure:
+    """Mean force of the two assistances for every kind and environment (Fig. 9); ``own`` as in Fig. 7a."""
+    figure, axes = new_figure(height=2.8)
+    samples: dict[str, ArrayLike] = {}
+    colors = []
+    for (environment, kind), cell in trials.groupby(["environment", "kind"], sort=False):
+        for name in ("assist_as_needed", "fixed_assistance"):
+            forces = cell.loc[cell["paradigm"] == name, "assistance_n"].to_numpy()
+            if len(forces) == 0:
+                continue
+            samples[f"{SHORT[name]}\n{kind}\n{environment}"] = forces
+            colors.append(PARADIGM_COLORS[name])
+            mine = _finished(own, trials, (environment, kind), [name])["assistance_n"]
+            axes.plot([len(samples)] * len(mine), mine, **OWN)
+    if samples:
+        box_groups(axes, samples, tuple(colors))
+    label_axes(axes, y="mean force H [N]")
+    return figure
+
+
+def claim_matrix(probabilities: pd.DataFrame) -> Figure:
+    """Probability of every claim (rows) under every attitude, law and approach (columns)."""
+    table = probabilities.assign(
+        condition=probabilities["attitude"] + ", " + probabilities["law"] + ", " + probabilities["approach"],
+        row=probabilities["claim"].str.replace("_", " ")
+        + " ("
+        + probabilities["kind"]
+        + ", "
+        + probabilities["environment"].str.replace("simulated", "sim")
+        + ")",
+    )
+    matrix = table.pivot_table(index="row", columns="condition", values="probability", sort=False)
+    figure, axes = new_figure(height=0.155 * len(matrix) + 1.6)
+    image = axes.imshow(matrix, cmap="RdYlBu", vmin=0, vmax=1, aspect="auto")
+    for (row, column), value in np.ndenumerate(matrix.to_numpy()):
+        if np.isfinite(value):
+            color = "white" if value < 0.12 or value > 0.88 else COLORS["black"]
+            axes.text(
+                column,
+                row,
+                f"{value:.2f}".lstrip("0") or "0",
+                ha="center",
+                va="center",
+                fontsize=5.5,
+                color=color,
+            )
+    axes.set_yticks(range(len(matrix)), list(matrix.index), fontsize=6)
+    axes.set_xticks(range(len(matrix.columns)), list(matrix.columns), rotation=40, ha="right", fontsize=6.5)
+    axes.grid(visible=False)
+    figure.colorbar(image, ax=axes, shrink=0.3, label="probability over operators")
+    return figure

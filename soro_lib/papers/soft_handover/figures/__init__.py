@@ -1,0 +1,1 @@
+"""Figures of the handover thesis: ``handovers`` and, on its cameras, ``vision``."""

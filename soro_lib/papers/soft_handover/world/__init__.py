@@ -1,0 +1,1 @@
+"""The simulated arm, the room, and what the cameras see of them."""

@@ -1,1 +1,0 @@
-"""One module per paper: the experiments, as pure functions from a random generator to tidy tables."""
