@@ -1,9 +1,10 @@
 """The equation index and the errata of a paper: which function is which equation, and which test holds it."""
 
 import ast
-import importlib
 from collections.abc import Callable
 from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any
 
 import pandas as pd
 
@@ -73,7 +74,7 @@ def index_problems(slug: str) -> list[str]:
     return problems
 
 
-def find_function(dotted_path: str) -> object:
+def find_function(dotted_path: str) -> Any:
     """Return the function, class or method of `soro_lib` with this dotted path.
 
     Raises
@@ -81,20 +82,12 @@ def find_function(dotted_path: str) -> object:
     LookupError
         If it does not exist or lies outside `soro_lib`.
     """
-    parts = dotted_path.split(".")
-    if parts[0] != "soro_lib":
+    if not dotted_path.startswith("soro_lib."):
         raise LookupError(f"function {dotted_path!r} must begin with soro_lib")
-    found: object = importlib.import_module("soro_lib")
-    for depth, name in enumerate(parts[1:], start=2):
-        try:
-            found = getattr(found, name)
-        except AttributeError:
-            try:
-                found = importlib.import_module(".".join(parts[:depth]))
-            except ImportError:
-                raise LookupError(
-                    f"function {dotted_path!r}: no {name!r} in {'.'.join(parts[: depth - 1])}"
-                ) from None
+    try:
+        found = resolve_name(dotted_path)
+    except (ImportError, AttributeError) as error:
+        raise LookupError(f"function {dotted_path!r}: {error}") from None
     if not callable(found):
         raise LookupError(f"function {dotted_path!r} cannot be called")
     return found

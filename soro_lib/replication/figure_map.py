@@ -54,15 +54,15 @@ def place_in_paper(name: str) -> str:
 
 def _shows(slug: str, name: str) -> str:
     """Return the first line of what draws the figure, or its name in words where nothing has that name."""
-    functions = [getattr(module, name) for module in _figure_modules(slug) if hasattr(module, name)]
-    text = inspect.getdoc(functions[0]) if functions else None
+    found = (getattr(module, name, None) for module in _figure_modules(slug))
+    text = next((inspect.getdoc(function) for function in found if inspect.isfunction(function)), None)
     words = re.sub(r"^(fig|table)\w*?_", "", name).replace("_", " ")
     return text.splitlines()[0].rstrip(".") if text else words
 
 
 def _figure_modules(slug: str) -> list[ModuleType]:
     """Return the module that draws the figures of a notebook, and those inside it where it is a package."""
-    name = f"soro_lib.replication.figures.{slug}"
+    name = f"soro_lib.papers.{slug}.figures"
     if importlib.util.find_spec(name) is None:
         return []
     module = importlib.import_module(name)

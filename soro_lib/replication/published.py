@@ -1,6 +1,6 @@
 """The published numbers of a paper, read from ``data/<slug>/published.csv`` and checked.
 
-Only the scorecard and a declared calibration (`soro_lib.calibrations`) may import this module.
+Only the scorecard and a paper's declared calibration may import this module.
 """
 
 import math

@@ -4,19 +4,14 @@ Every check returns its problems as texts that say what is wrong, where, and how
 """
 
 import argparse
-import json
 import subprocess
 import sys
 import tarfile
-import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-from packaging.requirements import Requirement
-from packaging.utils import canonicalize_name
 
 from soro_lib.project import ROOT, slugs
 from soro_lib.replication import datacards, summary
@@ -54,19 +49,6 @@ def update_readme(root: Path = ROOT) -> None:
 
 def _readme_block(root: Path) -> str:
     return summary.readme_block(summary.load_scorecards(root / "figures"))
-
-
-def notebooks(root: Path = ROOT) -> list[str]:
-    """Return notebooks that carry outputs or execution counts."""
-    problems = []
-    for path in sorted((root / "notebooks").glob("*.ipynb")):
-        for number, cell in enumerate(json.loads(path.read_text(encoding="utf-8"))["cells"], start=1):
-            if cell.get("outputs") or cell.get("execution_count") is not None:
-                problems.append(
-                    f"notebooks/{path.name}, cell {number}: carries outputs or an execution count; "
-                    f"run `nbstripout notebooks/{path.name}`"
-                )
-    return problems
 
 
 def figures(root: Path = ROOT) -> list[str]:
@@ -129,33 +111,6 @@ def data(root: Path = ROOT) -> list[str]:
     return problems
 
 
-def lock(root: Path = ROOT) -> list[str]:
-    """Return direct requirements of ``pyproject.toml`` that ``environment.txt`` does not pin, with a hash."""
-    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    wanted = project["dependencies"] + project.get("optional-dependencies", {}).get("dev", [])
-    locked = _locked_versions(root / "environment.txt")
-    problems = []
-    for requirement in map(Requirement, wanted):
-        versions = locked.get(canonicalize_name(requirement.name), [])
-        if not versions or not all(requirement.specifier.contains(version) for version in versions):
-            found = ", ".join(versions) or "no hashed pin"
-            problems.append(
-                f"environment.txt: {found} for `{requirement}` of pyproject.toml; run `make lock`"
-            )
-    return problems
-
-
-def _locked_versions(path: Path) -> dict[str, list[str]]:
-    """Return the versions pinned with hashes, by package; several where they depend on the platform."""
-    versions: dict[str, list[str]] = {}
-    for entry in path.read_text(encoding="utf-8").replace("\\\n", " ").splitlines():
-        text, separator, _ = entry.partition(" --hash=")
-        if separator:
-            pin = Requirement(text.strip())
-            versions.setdefault(canonicalize_name(pin.name), []).append(next(iter(pin.specifier)).version)
-    return versions
-
-
 def _git(root: Path, *arguments: str) -> bytes:
     """Return what git prints; raises RuntimeError where it fails."""
     result = subprocess.run(["git", *arguments], cwd=root, capture_output=True, check=False)
@@ -166,12 +121,10 @@ def _git(root: Path, *arguments: str) -> bytes:
 
 CHECKS: dict[str, Callable[[], list[str]]] = {
     "README shows the committed scorecard": readme,
-    "notebooks carry no outputs": notebooks,
     "committed figures are what the run wrote": figures,
     "verdicts follow from the rules": scorecards,
     "every equation has a function and a test": equations,
     "data files are what their cards say": data,
-    "the lock satisfies pyproject.toml": lock,
 }
 """Every check, by what it holds."""
 

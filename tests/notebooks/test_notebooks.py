@@ -112,7 +112,7 @@ def test_same_outputs_on_another_python(version: str, tmp_path: Path) -> None:
         ["make", "env", f"PYTHON={pythons[version]}"], cwd=tree, env=environment, check=False
     )
     assert made.returncode == 0
-    for slug in ("cross_robot", "gesture_steering", "soft_handover"):
+    for slug in list(find_notebooks(ROOT / "notebooks"))[1::2]:  # half of them, for the time it takes
         command = [".venv/bin/python", "-m", "soro_lib.workbook", "run", "--quick", "--only", slug]
         assert subprocess.run([*command, "--output", str(tmp_path)], cwd=tree, check=False).returncode == 0
         assert not changed(slug, tmp_path)

@@ -22,12 +22,15 @@ def test_place_is_read_off_the_name(name, place):
 
 def test_map_lists_figures_and_tables_with_what_they_show(tmp_path, monkeypatch):
     monkeypatch.setenv("SORO_FIGURES", str(tmp_path))
-    folder = tmp_path / "overview"
+    folder = tmp_path / "cross_robot"
     folder.mkdir()
     for name in ("four_arms.png", "table3_sizes.csv", "scorecard.csv", "notes.txt"):
         (folder / name).touch()
-    rows = figure_map(("overview", "nothing_here"))
-    assert rows["file"].tolist() == ["figures/overview/four_arms.png", "figures/overview/table3_sizes.csv"]
+    rows = figure_map(("cross_robot", "nothing_here"))
+    assert rows["file"].tolist() == [
+        "figures/cross_robot/four_arms.png",
+        "figures/cross_robot/table3_sizes.csv",
+    ]
     assert rows["shows"][0].startswith("Draw every arm on its way")
     assert rows["shows"][1] == "sizes"
     assert rows["place"].tolist() == ["", "Table 3"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from soro_lib.project import ROOT
+from soro_lib.project import ROOT, slugs
 from soro_lib.workbook import golden
 from soro_lib.workbook.generators import NothingToRun, generators
 from soro_lib.workbook.golden import GoldenError, lost_tests, unresolved
@@ -77,12 +77,7 @@ def test_the_best_time_of_each_benchmark_counts_until_one_run_fails(tmp_path):
 
 def test_every_generator_takes_the_small_form_and_a_folder():
     found = {**generators("data"), **generators("calibrations")}
-    assert set(found.values()) >= {
-        "gesture_steering",
-        "shared_control",
-        "soft_handover",
-        "visual_strain_fusion",
-    }
+    assert set(found.values()) == set(slugs())
     for module in found:
         source = ROOT.joinpath(*module.split(".")).with_suffix(".py").read_text()
         assert "generator_options(" in source, module
