@@ -158,7 +158,7 @@ def test_import_on_the_same_floor_or_below_is_allowed() -> None:
     assert not wrong_imports(source, Path("soro_lib/robots/helix.py"))
 
 
-@pytest.mark.parametrize("slug", slugs())
+@pytest.mark.parametrize("slug", [*slugs(), "cross_robot"])
 def test_rooms_of_papers_have_the_same_files(slug: str) -> None:
     paths = (ROOT / "soro_lib" / "papers" / slug).iterdir()
     assert {path.stem for path in paths if path.name != "__pycache__"} <= ROOM_FILES

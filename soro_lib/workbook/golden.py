@@ -158,15 +158,33 @@ def digests(folder: Path) -> dict[str, str]:
 
 def lost_tests(before: Sequence[str], now: Sequence[str], renames: Mapping[str, str]) -> list[str]:
     """Return the tests that are gone without a new name, and new names that no test has."""
-    there = set(now)
-    lost = [f"test {name} is gone; if that is wanted, say so in renames.csv" for name in before]
-    lost = [text for name, text in zip(before, lost, strict=True) if name not in there | renames.keys()]
-    wrong = [f"renames.csv: there is no test {new}" for new in renames.values() if new and new not in there]
-    return lost + wrong
+    there, problems = set(now), []
+    for name in before:
+        new = name if name in there else renamed(name, renames)
+        if new is None:
+            problems.append(f"test {name} is gone; if that is wanted, say so in renames.csv")
+        elif new and new not in there:
+            problems.append(f"renames.csv: there is no test {new}")
+    return problems
+
+
+def renamed(test: str, renames: Mapping[str, str]) -> str | None:
+    """Return the new name of a test, nothing if it was given up, None if no row speaks of it.
+
+    A row names a test, all cases of one or all tests of a file; the longest that fits counts.
+    """
+    parts = re.split(r"(?=::|\[)", test)
+    starts = ["".join(parts[:count]) for count in range(len(parts), 0, -1)]
+    old = next((start for start in starts if start in renames), None)
+    if old is None:
+        return None
+    return renames[old] and renames[old] + test.removeprefix(old)
 
 
 def load_renames(path: Path) -> dict[str, str]:
-    """Return the new name of each renamed test, empty for one that was given up: columns old, new, reason.
+    """Return the new name of each renamed test (or file of tests), empty for what was given up.
+
+    The columns are old, new, reason.
 
     Raises
     ------

@@ -37,7 +37,11 @@ def test_index_of_each_paper_is_complete(slug):
         ),
         ("soro_lib.arcs.arc_transform", "numpy.cos", "must begin with soro_lib"),
         ("soro_lib.arcs.arc_transform", "soro_lib.arcs", "cannot be called"),
-        ("soro_lib.arcs.", "soro_lib.archs.", "'soro_lib.archs.arc_transform': module 'soro_lib' has no attribute 'archs'"),
+        (
+            "soro_lib.arcs.",
+            "soro_lib.archs.",
+            "module 'soro_lib' has no attribute 'archs'",
+        ),
         ("::test_index_is_complete", "::test_index_is_done", "no 'test_index_is_done' in tests/replication"),
         ("::test_index_is_complete", "", "expected tests/file.py::test_name"),
         ("tests/replication/test_equations.py", "tests/nowhere.py", "no file tests/nowhere.py"),

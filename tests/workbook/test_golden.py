@@ -19,8 +19,22 @@ def test_a_lost_test_is_told_unless_it_has_a_new_name():
     assert lost_tests(before, now, renames) == []
     (lost,) = lost_tests(before, now, {"tests/a.py::test_y": "tests/b.py::test_y"})
     assert "tests/a.py::test_z is gone" in lost
-    (wrong,) = lost_tests(before[:1], now, {"tests/a.py::test_w": "tests/c.py::test_w"})
-    assert "there is no test tests/c.py::test_w" in wrong
+    (wrong,) = lost_tests(before[1:2], now, {"tests/a.py::test_y": "tests/c.py::test_y"})
+    assert "there is no test tests/c.py::test_y" in wrong
+
+
+def test_a_row_may_rename_all_tests_of_a_file_or_all_cases_of_a_test():
+    before = [
+        "tests/a.py::test_x[1-a::b]",
+        "tests/a.py::test_x[2]",
+        "tests/a.py::test_y",
+        "tests/ab.py::test_z",
+    ]
+    now = ["tests/b.py::test_w[1-a::b]", "tests/b.py::test_w[2]", "tests/c.py::test_y", "tests/ab.py::test_z"]
+    renames = {"tests/a.py": "tests/c.py", "tests/a.py::test_x": "tests/b.py::test_w"}
+    assert lost_tests(before, now, renames) == []
+    assert len(lost_tests(before, now, {"tests/a.py": "tests/c.py"})) == 2
+    assert lost_tests(before, now, {"tests/a.py": ""}) == []
 
 
 def test_imports_of_readme_and_notebooks_are_found_and_resolve():

@@ -6,7 +6,7 @@ from IPython.display import Image
 from numpy.typing import NDArray
 
 from soro_lib.papers.cross_robot.figures.four_arms import one_arm, piece_colors
-from soro_lib.papers.cross_robot.four_arms import Specimen, four_arms
+from soro_lib.papers.cross_robot.world.four_arms import Specimen, four_arms
 from soro_lib.replication import as_image
 from soro_lib.replication.frontend import is_live
 from soro_lib.replication.view import ArmView, arm_scene, tube

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from soro_lib.papers.cross_robot.explorer import DISPLAY_UNITS, ArmExplorer, explore
 from soro_lib.papers.cross_robot.figures.four_arms import four_arms as draw_four_arms
-from soro_lib.papers.cross_robot.four_arms import four_arms
+from soro_lib.papers.cross_robot.world.four_arms import four_arms
 from soro_lib.replication import frontend
 
 ARMS = range(4)

@@ -1,1 +1,1 @@
-"""Every controller on every arm: the same path, the same disturbance, only the `Robot` interface between."""
+"""Every controller on every arm, and what comes of exchanging their ideas."""

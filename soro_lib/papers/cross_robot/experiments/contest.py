@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from soro_lib.papers.cross_robot.experiments.arms import Array, Bench, Plants, benches, disturbed_and_not
 from soro_lib.papers.cross_robot.experiments.laws import Controller, NotApplicable, controllers
+from soro_lib.papers.cross_robot.world.benches import Array, Bench, Plants, benches, disturbed_and_not
 
 SENSOR_NOISE = 0.002
 """Standard deviation of the measured tip, as a share of the arm's length, and of its direction [rad]."""

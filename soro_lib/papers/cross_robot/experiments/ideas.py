@@ -10,7 +10,15 @@ import pandas as pd
 from soro_lib.controllers import AssistAsNeeded, FixedAssistance, GestureSteering
 from soro_lib.controllers.gesture_steering import SteeringSettings
 from soro_lib.controllers.steering_step import StepWeights
-from soro_lib.papers.cross_robot.experiments.arms import (
+from soro_lib.papers.cross_robot.experiments.contest import SENSOR_NOISE
+from soro_lib.papers.cross_robot.experiments.laws import (
+    STEP_TIME,
+    VirtualStiffness,
+    actuator_stiffness,
+    palm_mapping,
+    stiff_step,
+)
+from soro_lib.papers.cross_robot.world.benches import (
     CABLE_LENGTH,
     GROWN_LENGTH,
     HELIX_LENGTH,
@@ -19,14 +27,6 @@ from soro_lib.papers.cross_robot.experiments.arms import (
     as_it_is,
     benches,
     resized,
-)
-from soro_lib.papers.cross_robot.experiments.contest import SENSOR_NOISE
-from soro_lib.papers.cross_robot.experiments.laws import (
-    STEP_TIME,
-    VirtualStiffness,
-    actuator_stiffness,
-    palm_mapping,
-    stiff_step,
 )
 from soro_lib.sensing.hand_tracking import HandSample
 

@@ -22,7 +22,7 @@ from soro_lib.controllers.hand_mapping import PalmMapping
 from soro_lib.controllers.hybrid import HybridSettings
 from soro_lib.controllers.steering_step import StepWeights
 from soro_lib.controllers.virtual_stiffness import HELIX, STIFFENING
-from soro_lib.papers.cross_robot.experiments.arms import (
+from soro_lib.papers.cross_robot.world.benches import (
     CABLE_LENGTH,
     CHAMBER_LENGTH,
     GROWN_LENGTH,

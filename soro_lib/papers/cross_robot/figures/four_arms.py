@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from soro_lib.papers.cross_robot.four_arms import Specimen
+from soro_lib.papers.cross_robot.world.four_arms import Specimen
 from soro_lib.replication.plotting import COLORS, PAGE_WIDTH, SERIES, equal_aspect, new_figure
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from soro_lib.arcs import chain_transform, chain_transform_and_jacobian
-from soro_lib.papers.cross_robot.four_arms import Specimen, four_arms
+from soro_lib.papers.cross_robot.world.four_arms import Specimen, four_arms
 from soro_lib.paths import infinity
 from soro_lib.robots.base import ClippedActuation, Robot
 

@@ -7,15 +7,6 @@ from numpy.testing import assert_allclose
 from scipy.stats import t as student
 
 from soro_lib.controllers.virtual_stiffness import weighted_pseudo_inverse
-from soro_lib.papers.cross_robot.experiments.arms import (
-    HELIX_LENGTH,
-    MOUNT_TILT,
-    STIFFER,
-    Bench,
-    benches,
-    disturbed_and_not,
-    resized,
-)
 from soro_lib.papers.cross_robot.experiments.contest import contest, interval, track
 from soro_lib.papers.cross_robot.experiments.ideas import guidance, redundancy
 from soro_lib.papers.cross_robot.experiments.laws import (
@@ -25,6 +16,15 @@ from soro_lib.papers.cross_robot.experiments.laws import (
     controllers,
     palm_mapping,
     stiff_step,
+)
+from soro_lib.papers.cross_robot.world.benches import (
+    HELIX_LENGTH,
+    MOUNT_TILT,
+    STIFFER,
+    Bench,
+    benches,
+    disturbed_and_not,
+    resized,
 )
 from soro_lib.robots import HelixArm
 
