@@ -22,7 +22,7 @@ NEAR_LIMIT = 0.011
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class TrackedPath:
     """One controller on a batch of one arm.
 
     Attributes
@@ -64,7 +64,7 @@ def track(
     holding: int,
     rng: np.random.Generator,
     scaled: bool = True,
-) -> Run:
+) -> TrackedPath:
     """Let a batch of arms follow the path under one controller.
 
     Parameters
@@ -100,12 +100,12 @@ def track(
         tip, direction = plants.tip_and_direction(actuation)
         tips[step], directions[step] = tip, direction
         at_limit[step] = ((actuation < lowest) | (actuation > highest)).any(axis=-1)
-    return Run(goals, tips, directions, at_limit, law.steers)
+    return TrackedPath(goals, tips, directions, at_limit, law.steers)
 
 
 def contest(
     rng: np.random.Generator, seeds: int = 10, moving: int = 180, holding: int = 60
-) -> tuple[pd.DataFrame, dict[tuple[str, str], Run]]:
+) -> tuple[pd.DataFrame, dict[tuple[str, str], TrackedPath]]:
     """Let every controller steer every arm, as modelled and disturbed, with constants scaled and as printed.
 
     Parameters
@@ -125,10 +125,10 @@ def contest(
         at the end, with mean and 95 % interval over seeds; direction error; share of steps at a limit; why
         not, where a controller cannot be applied.
     runs : dict
-        The `Run` with scaled constants by controller and arm; the first half of a batch is as modelled.
+        With scaled constants, by controller and arm; the first half of a batch is as modelled.
     """
     rows: list[dict[str, Any]] = []
-    runs: dict[tuple[str, str], Run] = {}
+    runs: dict[tuple[str, str], TrackedPath] = {}
     mounts, noise = rng.integers(2**32, size=2)
     for arm, bench in benches().items():
         plants = disturbed_and_not(bench.robot, seeds, np.random.default_rng(mounts))
@@ -161,7 +161,7 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-def outcomes(run: Run, bench: Bench, moving: int) -> list[dict[str, Any]]:
+def outcomes(run: TrackedPath, bench: Bench, moving: int) -> list[dict[str, Any]]:
     """Return the figures of merit of a run, for the undisturbed and the disturbed half of its batch."""
     error, turn = 1e3 * run.error, np.degrees(run.direction_error)
     settled = moving + (len(error) - moving) // 2

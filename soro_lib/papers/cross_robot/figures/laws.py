@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from soro_lib.papers.cross_robot.experiments.contest import Run
+from soro_lib.papers.cross_robot.experiments.contest import TrackedPath
 from soro_lib.replication.plotting import COLORS, PAGE_WIDTH, REFERENCE, TRUTH, label_axes, legend, new_figure
 
 SMALLEST = 0.03
@@ -61,7 +61,7 @@ def _draw(
     axes.errorbar(value, rows, xerr=reach, label=label, **style)
 
 
-def paths(runs: Mapping[tuple[str, str], Run]) -> Figure:
+def paths(runs: Mapping[tuple[str, str], TrackedPath]) -> Figure:
     """The way of the tips of the disturbed arms, one controller per row and one arm per column."""
     names = ("gesture steering", "fixed assistance", "hybrid, learning", "virtual stiffness")
     arms = list(dict.fromkeys(arm for _, arm in runs))
