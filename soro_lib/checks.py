@@ -29,6 +29,20 @@ class Bounds(TypedDict, total=False):
     at_most: float
 
 
+def numbers(
+    name: str, value: ArrayLike, shape: Shape | None = None, error: type[ValueError] = ValueError
+) -> NDArray[np.float64]:
+    """Return numbers of a shape, finite or not, as an array; see :func:`finite`."""
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as problem:
+        of_shape = "" if shape is None else f" of shape {_written(shape)}"
+        raise error(f"{name} must be numbers{of_shape}: {problem}") from None
+    if shape is not None and not _fits(array.shape, shape):
+        raise error(f"{name} must have shape {_written(shape)}, got {array.shape}")
+    return array
+
+
 def finite(
     name: str,
     value: ArrayLike,
@@ -63,13 +77,7 @@ def finite(
     ...
     ValueError: weights must be a finite number above 0, got 0.0 at index (1,)
     """
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError) as problem:
-        of_shape = "" if shape is None else f" of shape {_written(shape)}"
-        raise error(f"{name} must be numbers{of_shape}: {problem}") from None
-    if shape is not None and not _fits(array.shape, shape):
-        raise error(f"{name} must have shape {_written(shape)}, got {array.shape}")
+    array = numbers(name, value, shape, error)
     good = _within(array, **bounds) if bounds else np.isfinite(array)
     if not good.all():
         index = tuple(np.argwhere(~good)[0].tolist())
@@ -79,8 +87,14 @@ def finite(
 
 
 def number(name: str, value: float, **bounds: Unpack[Bounds]) -> float:
-    """Return one finite number within bounds; see :func:`finite`."""
-    return float(finite(name, value, (), **bounds))
+    """Return one finite number within bounds, or raise a ValueError that names it and the bound."""
+    try:
+        single = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a number, got {value!r}") from None
+    if not _within(single, **bounds):
+        raise ValueError(f"{name} must be {_phrase(**bounds)}, got {value}")
+    return single
 
 
 def positive(name: str, value: float) -> float:
@@ -127,7 +141,11 @@ def check_fields(owner: Any, *names: str, shape: Shape = (), **bounds: Unpack[Bo
     ValueError: SimpleNamespace.gain must be a finite number above 0, got 0.0
     """
     for name in names or vars(owner):
-        finite(f"{type(owner).__name__}.{name}", getattr(owner, name), shape, **bounds)
+        title, value = f"{type(owner).__name__}.{name}", getattr(owner, name)
+        if shape:
+            finite(title, value, shape, **bounds)
+        else:
+            number(title, value, **bounds)
 
 
 @lru_cache(maxsize=1024)
@@ -149,14 +167,14 @@ def _written(shape: Shape) -> str:
 
 
 def _within(
-    array: NDArray[np.float64],
+    value: Any,
     above: float = -inf,
     at_least: float | None = None,
     below: float = inf,
     at_most: float | None = None,
-) -> NDArray[np.bool_]:
-    high_enough = array > above if at_least is None else array >= at_least
-    return high_enough & (array < below if at_most is None else array <= at_most)
+) -> Any:
+    high_enough = value > above if at_least is None else value >= at_least
+    return high_enough & (value < below if at_most is None else value <= at_most)
 
 
 def _phrase(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields, finite
 from soro_lib.controllers.gestures import GestureRule, Mode
 from soro_lib.controllers.hand_gate import GatedHand, GateSettings, HandGate
 from soro_lib.controllers.hand_mapping import PalmMapping, TipGoal, Vector
@@ -93,22 +94,9 @@ class SteeringSettings:
     margin: float | None = None
 
     def __post_init__(self) -> None:
-        positive = (
-            "direction_time_constant",
-            "tip_speed",
-            "turn_rate",
-            "cable_rate",
-            "slide_speed",
-            "longest_interval",
-        )
-        for name in (*positive, "iterations"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"SteeringSettings.{name} = {value}, must be finite and > 0")
-        if not 0 <= self.minimum_tension < 1:
-            raise ValueError(
-                f"SteeringSettings.minimum_tension = {self.minimum_tension}, must be in [0, 1) N"
-            )
+        speeds = ("tip_speed", "turn_rate", "cable_rate", "slide_speed")
+        check_fields(self, *speeds, "direction_time_constant", "longest_interval", "iterations", above=0)
+        check_fields(self, "minimum_tension", at_least=0, below=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,9 +188,7 @@ class GestureSteering:
 
     def reset(self, actuation: ArrayLike) -> None:
         """Start anew at an actuation (n,); it is moved into the limits."""
-        self.actuation: Array = np.clip(np.asarray(actuation, dtype=float), self._lower, self._upper)
-        if not np.isfinite(self.actuation).all():
-            raise ValueError(f"GestureSteering: actuation = {actuation!r}, must be finite")
+        self.actuation = finite("actuation", np.clip(actuation, self._lower, self._upper))
         self.pose = self._kinematics(self.actuation)
         self._gate = HandGate(self.settings.mapping, self.settings.gate)
         self._gesture = GestureRule(self.settings.gesture_hold, self.settings.opposite_hold)

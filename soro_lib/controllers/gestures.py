@@ -9,6 +9,8 @@ import math
 from collections.abc import Sequence
 from enum import StrEnum
 
+from soro_lib.checks import not_negative
+
 
 class Mode(StrEnum):
     """The four modes of Lai et al., Fig. 4."""
@@ -50,10 +52,8 @@ class GestureRule:
     """
 
     def __init__(self, hold: float = 0.13, opposite_hold: float = 0.25) -> None:
-        for name, value in (("hold", hold), ("opposite_hold", opposite_hold)):
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"GestureRule.{name} = {value}, must be finite and >= 0")
-        self.hold, self.opposite_hold = hold, opposite_hold
+        self.hold = not_negative("GestureRule.hold", hold)
+        self.opposite_hold = not_negative("GestureRule.opposite_hold", opposite_hold)
         self.mode = Mode.PALM
         self._candidate: Mode | None = None
         self._since = self._seen = -math.inf

@@ -9,9 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from soro_lib.checks import Vector, check_fields
 from soro_lib.controllers.gestures import Mode
-
-Vector = tuple[float, float, float]
 
 
 class TipGoal(NamedTuple):
@@ -58,19 +57,11 @@ class PalmMapping:
     tilt_loss: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("scale_x", "scale_y", "scale_z", "offset"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"PalmMapping.{name} = {getattr(self, name)}, must be finite")
-        if not 0 < self.half_width < math.inf:
-            raise ValueError(f"PalmMapping.half_width = {self.half_width}, must be > 0 and finite")
-        if not 0 < self.lowest < self.highest < math.inf:
-            raise ValueError(
-                f"PalmMapping: 0 < lowest < highest must hold, got {self.lowest}, {self.highest}"
-            )
-        if not 0 < self.maximum_tilt < math.pi / 2:
-            raise ValueError(f"PalmMapping.maximum_tilt = {self.maximum_tilt}, must be in (0, pi/2)")
-        if not 0 <= self.tilt_loss < math.inf:
-            raise ValueError(f"PalmMapping.tilt_loss = {self.tilt_loss}, must be >= 0 and finite")
+        check_fields(self, "scale_x", "scale_y", "scale_z", "offset")
+        check_fields(self, "half_width", "highest", above=0)
+        check_fields(self, "lowest", above=0, below=self.highest)
+        check_fields(self, "maximum_tilt", above=0, below=math.pi / 2)
+        check_fields(self, "tilt_loss", at_least=0)
 
     def in_box(self, palm: Vector) -> bool:
         """Return whether the palm [m, device frame] is where the paper allows it (Section IV-A)."""

@@ -11,6 +11,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
 from soro_lib.estimators.handover_filters import APPENDIX_A, FilterParameters, HandoverFilters
 from soro_lib.estimators.shape_estimation import POSE_WEIGHTS, ShapeEstimate, estimate_shape
@@ -79,11 +80,8 @@ class SafetyRules:
     retreat_share: float = 0.1
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be positive, got {value}")
-        if self.retreat_share > 1:
-            raise ValueError(f"retreat_share must be at most 1, got {self.retreat_share}")
+        check_fields(self, above=0)
+        check_fields(self, "retreat_share", at_most=1)
 
 
 @dataclass(frozen=True)
@@ -129,14 +127,9 @@ class HandoverParameters:
     motors: TendonMotors = field(default_factory=TendonMotors)
 
     def __post_init__(self) -> None:
-        for name in ("pose_bound", "stop_threshold"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        for name in ("pose_bound_share", "bend_softening", "grasp_offset"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise ValueError(f"{name} must be at least 0, got {getattr(self, name)}")
-        if len(self.pose_weights) != 9 or not all(w > 0 for w in self.pose_weights):
-            raise ValueError(f"pose_weights must be nine positive numbers, got {self.pose_weights}")
+        check_fields(self, "pose_bound", "stop_threshold", above=0)
+        check_fields(self, "pose_bound_share", "bend_softening", "grasp_offset", at_least=0)
+        check_fields(self, "pose_weights", shape=(9,), above=0)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields, numbers
 from soro_lib.estimators.extreme_learning_machine import POSE_SIZE, ExtremeLearningMachine
 from soro_lib.estimators.grating_mask import GratingMask
 from soro_lib.estimators.pose_fusion import fuse_poses, inlier_weighted_error
@@ -42,13 +43,10 @@ class VisualStrainSettings:
 
     def __post_init__(self) -> None:
         """Check the values; the error names the field and its bound."""
-        if self.initial_samples < 1:
-            raise ValueError(f"initial_samples must be at least 1, got {self.initial_samples}")
-        for name in ("update_threshold", "nominal_inliers", "grating_noise", "agreement"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise ValueError(f"{name} must be finite and not negative, got {getattr(self, name)}")
-        if not 0.0 <= self.lower < self.upper < np.inf:
-            raise ValueError(f"lower must be below upper, got {self.lower} and {self.upper}")
+        check_fields(self, "initial_samples", at_least=1)
+        check_fields(self, "update_threshold", "nominal_inliers", "grating_noise", "agreement", at_least=0)
+        check_fields(self, "upper")
+        check_fields(self, "lower", at_least=0, below=self.upper)
 
 
 @dataclass(frozen=True)
@@ -148,9 +146,7 @@ class VisualStrainEstimator:
         ValueError
             If a shape is wrong.
         """
-        shift = np.asarray(shift, dtype=float)
-        if shift.shape != (self.network.centres.shape[1],):
-            raise ValueError(f"shift must be ({self.network.centres.shape[1]},), got {shift.shape}")
+        shift = numbers("shift", shift, (self.network.centres.shape[1],))
         if not time > self._time:
             return self._repeat(f"time stamp {time} does not follow {self._time}")
         self._time = time
@@ -180,9 +176,7 @@ class VisualStrainEstimator:
         """Keep the latest valid camera pose; return the error the fusion shall act on."""
         if pose is None:
             return np.inf
-        pose = np.asarray(pose, dtype=float)
-        if pose.shape != (POSE_SIZE,):
-            raise ValueError(f"camera_pose must be ({POSE_SIZE},), got {pose.shape}")
+        pose = numbers("camera_pose", pose, (POSE_SIZE,))
         if not np.isfinite(pose).all() or not np.isfinite(reprojection_error) or pose[3:] @ pose[3:] < 1e-12:
             return np.inf
         self._camera_pose = np.concatenate([pose[:3], pose[3:] / np.sqrt(pose[3:] @ pose[3:])])

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from soro_lib.arcs import chain_jacobian, chain_transform
-from soro_lib.robots.base import FloatArray, Robot, require_positive
+from soro_lib.checks import check_fields, one_of
+from soro_lib.robots.base import FloatArray, Robot
 
 CABLE_ANGLES = 2.0 * np.pi / 3.0 * np.arange(3)
 """Directions of the three cables of a segment about z [rad]."""
@@ -74,22 +75,11 @@ class CableDrivenArm(Robot):
     )
 
     def __post_init__(self) -> None:
-        require_positive(
-            young_modulus=self.young_modulus,
-            outer_radius=self.outer_radius,
-            cable_radius=self.cable_radius,
-            segment_length=self.segment_length,
-            slide_length=self.slide_length,
-            maximum_tension=self.maximum_tension,
-        )
-        if not 0.0 <= self.inner_radius < self.outer_radius:
-            raise ValueError(
-                f"inner_radius must be in [0, outer_radius = {self.outer_radius}), got {self.inner_radius!r}"
-            )
-        if self.coupling_sign not in (-1, 1):
-            raise ValueError(f"coupling_sign must be -1 or +1, got {self.coupling_sign!r}")
-        if not (np.isfinite(self.cap_length) and self.cap_length >= 0.0):
-            raise ValueError(f"cap_length must be finite and at least 0, got {self.cap_length!r}")
+        sizes = ("young_modulus", "outer_radius", "cable_radius", "segment_length", "slide_length")
+        check_fields(self, *sizes, "maximum_tension", above=0)
+        check_fields(self, "inner_radius", at_least=0, below=self.outer_radius)
+        check_fields(self, "cap_length", at_least=0)
+        one_of("CableDrivenArm.coupling_sign", self.coupling_sign, (-1, 1))
         compression = 6.0 * self.maximum_tension / self.axial_stiffness
         if compression >= self.segment_length:
             raise ValueError(

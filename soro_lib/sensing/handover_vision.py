@@ -7,6 +7,7 @@ from itertools import combinations, product
 import numpy as np
 from numpy.typing import NDArray
 
+from soro_lib.checks import one_of
 from soro_lib.sensing.camera import Image
 from soro_lib.sensing.handover_observation import HandoverObservation
 from soro_lib.sensing.marker_pose import (
@@ -123,8 +124,7 @@ class HandoverVision:
     largest_gap: float = 0.010
 
     def __post_init__(self) -> None:
-        if self.estimator not in ESTIMATORS:
-            raise ValueError(f"estimator must be one of {', '.join(ESTIMATORS)}, got {self.estimator!r}")
+        one_of("estimator", self.estimator, ESTIMATORS)
         if len(self.cameras) < 2:
             raise ValueError(f"two cameras are needed at least, got {len(self.cameras)}")
         self.marker_detector = MarkerDetector(self.ring, corner_shift=self.corner_shift)

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from soro_lib.sensing.camera import Camera, clip_half_space, invert_pose, look_at, transform_points
 from soro_lib.worlds.rendering import (
-    NoiseBank,
     Photometry,
     Polygon,
     TexturedQuad,
@@ -165,13 +164,6 @@ def test_expose_without_noise_is_the_image_in_colour_too():
     image = np.random.default_rng(5).integers(0, 255, (20, 30, 3), dtype=np.uint8)
     np.testing.assert_array_equal(expose(image, quiet(), np.zeros(image.shape, np.float32)), image)
     assert expose(image, quiet(2.0), np.zeros(image.shape, np.float32)).max() == 255
-
-
-def test_noise_bank_is_white_and_repeatable():
-    bank = NoiseBank((60, 80), np.random.default_rng(6))
-    first, second = bank.draw(np.random.default_rng(7)), bank.draw(np.random.default_rng(7))
-    np.testing.assert_array_equal(first, second)
-    assert first.std() == pytest.approx(1, abs=0.05)
 
 
 @pytest.mark.parametrize(
