@@ -78,11 +78,11 @@ def finite(
     ValueError: weights must be a finite number above 0, got 0.0 at index (1,)
     """
     array = numbers(name, value, shape, error)
-    good = _within(array, **bounds) if bounds else np.isfinite(array)
+    good = _within(array, bounds) if bounds else np.isfinite(array)
     if not good.all():
         index = tuple(np.argwhere(~good)[0].tolist())
         where = f" at index {index}" if index else ""
-        raise error(f"{name} must be {_phrase(**bounds)}, got {array[index]}{where}")
+        raise error(f"{name} must be {_phrase(bounds)}, got {array[index]}{where}")
     return array
 
 
@@ -92,8 +92,8 @@ def number(name: str, value: float, **bounds: Unpack[Bounds]) -> float:
         single = float(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a number, got {value!r}") from None
-    if not _within(single, **bounds):
-        raise ValueError(f"{name} must be {_phrase(**bounds)}, got {value}")
+    if not _within(single, bounds):
+        raise ValueError(f"{name} must be {_phrase(bounds)}, got {value}")
     return single
 
 
@@ -166,27 +166,21 @@ def _written(shape: Shape) -> str:
     return f"({sizes},)" if len(shape) == 1 else f"({sizes})"
 
 
-def _within(
-    value: Any,
-    above: float = -inf,
-    at_least: float | None = None,
-    below: float = inf,
-    at_most: float | None = None,
-) -> Any:
-    high_enough = value > above if at_least is None else value >= at_least
-    return high_enough & (value < below if at_most is None else value <= at_most)
+def _within(value: Any, bounds: Bounds) -> Any:
+    high = value >= bounds["at_least"] if "at_least" in bounds else value > bounds.get("above", -inf)
+    low = value <= bounds["at_most"] if "at_most" in bounds else value < bounds.get("below", inf)
+    return high & low
 
 
-def _phrase(
-    above: float = -inf, at_least: float | None = None, below: float = inf, at_most: float | None = None
-) -> str:
-    lower = above if at_least is None else at_least
-    upper = below if at_most is None else at_most
-    if -inf < lower and upper < inf:
-        return f"in {'(' if at_least is None else '['}{lower}, {upper}{')' if at_most is None else ']'}"
+def _phrase(bounds: Bounds) -> str:
+    closed_below, closed_above = "at_least" in bounds, "at_most" in bounds
+    lower = bounds["at_least"] if closed_below else bounds.get("above", -inf)
+    upper = bounds["at_most"] if closed_above else bounds.get("below", inf)
     if lower == -inf and upper == inf:
         return "finite"
-    kind = "number" if at_most == inf else "finite number"
+    if lower > -inf and upper < inf:
+        return f"in {'[' if closed_below else '('}{lower}, {upper}{']' if closed_above else ')'}"
+    kind = "number" if closed_above and upper == inf else "finite number"
     if lower > -inf:
-        return f"a {kind} {'above' if at_least is None else 'not below'} {lower}"
-    return f"a {kind} {'below' if at_most is None else 'not above'} {upper}"
+        return f"a {kind} {'not below' if closed_below else 'above'} {lower}"
+    return f"a {kind} {'not above' if closed_above else 'below'} {upper}"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.checks import check_fields, finite
-from soro_lib.controllers.gestures import GestureRule, Mode
+from soro_lib.controllers.gestures import Gesture, GestureRule
 from soro_lib.controllers.hand_gate import GatedHand, GateSettings, HandGate
 from soro_lib.controllers.hand_mapping import PalmMapping, TipGoal, Vector
 from soro_lib.controllers.obstacles import Sphere, clearances
@@ -109,7 +109,7 @@ class SteeringResult:
         Of the frame [s].
     actuation : ndarray (n,)
         Command to the arm, always within its limits.
-    mode : Mode
+    mode : Gesture
         Gesture mode in force.
     converged : bool
         Whether the frame was sound and the least squares solved.
@@ -127,7 +127,7 @@ class SteeringResult:
 
     time: float
     actuation: Array
-    mode: Mode
+    mode: Gesture
     converged: bool
     reason: str
     goal: TipGoal
@@ -197,7 +197,7 @@ class GestureSteering:
         self._direction.reset(self.pose.direction)
         self._hand: tuple[Vector, Vector] | None = None  # palm [m] and normal that are followed, device frame
         self._target, self._locked_mid = self.pose.tip, self.pose.mid
-        self._mode = Mode.PALM
+        self._mode = Gesture.PALM
         self._time: float | None = None
 
     def update(self, hand_sample: HandSample) -> SteeringResult:
@@ -244,17 +244,17 @@ class GestureSteering:
             palm = self._palm.predicted(time).tolist() if recent else self._hand[0]
             self._hand = (palm, self._hand[1]) if self.settings.mapping.in_box(palm) else self._hand
 
-    def _goal(self, mode: Mode) -> TipGoal:
+    def _goal(self, mode: Gesture) -> TipGoal:
         """Return what the hand asks for under the mode; before the first hand, to stay."""
         if self._hand is None:
             return TipGoal(tuple(self.pose.tip.tolist()), tuple(self.pose.direction.tolist()))
         return self.settings.mapping.goal(*self._hand, mode)
 
-    def _change(self, mode: Mode) -> None:
+    def _change(self, mode: Gesture) -> None:
         """On entering the fist, lock the mid point; on leaving it, turn on from where the tip points now."""
-        if mode is Mode.FIST and self._mode is not Mode.FIST:
+        if mode is Gesture.FIST and self._mode is not Gesture.FIST:
             self._locked_mid = self.pose.mid
-        elif mode is not Mode.FIST and self._mode is Mode.FIST:
+        elif mode is not Gesture.FIST and self._mode is Gesture.FIST:
             self._direction.reset(self.pose.direction)
         self._mode = mode
 
@@ -264,7 +264,7 @@ class GestureSteering:
             np.subtract(goal.position, self._target), self.settings.tip_speed * interval
         )
 
-    def _stepped(self, mode: Mode, interval: float) -> Step:
+    def _stepped(self, mode: Gesture, interval: float) -> Step:
         """Solve for the step of the actuation and take it."""
         share = interval / self.settings.iterations
         for _ in range(self.settings.iterations):
@@ -274,7 +274,7 @@ class GestureSteering:
             self._take(step.actuation_step, share)
         return step
 
-    def _solved(self, mode: Mode, interval: float) -> Step:
+    def _solved(self, mode: Gesture, interval: float) -> Step:
         settings, pose = self.settings, self.pose
         reach = self._rates * interval
         lower = np.maximum(self._lower - self.actuation, -reach)
@@ -282,7 +282,7 @@ class GestureSteering:
         position_step = _shortened(self._target - pose.tip, settings.tip_speed * interval)
         direction_step = _shortened(self._direction.direction - pose.direction, settings.turn_rate * interval)
         bounds = StepBounds(lower, upper, self._units)
-        if mode is Mode.FIST:
+        if mode is Gesture.FIST:
             mid_step = self._locked_mid - pose.mid
             problem = locked_step(pose, position_step, mid_step, direction_step, bounds, settings.weights)
         elif settings.obstacles:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from soro_lib.checks import Vector, check_fields
-from soro_lib.controllers.gestures import Mode
+from soro_lib.controllers.gestures import Gesture
 
 
 class TipGoal(NamedTuple):
@@ -83,7 +83,7 @@ class PalmMapping:
         x, y, z = normal
         return x, -z, -y
 
-    def goal(self, palm: Vector, normal: Vector, mode: Mode = Mode.PALM) -> TipGoal:
+    def goal(self, palm: Vector, normal: Vector, mode: Gesture = Gesture.PALM) -> TipGoal:
         """Return the goal of a hand under a mode, with its tilt limited."""
         goal = constrained_goal(mode, TipGoal(self.position(palm), self.direction(normal)))
         return goal._replace(direction=limited_tilt(goal.direction, self.tilt_limit(goal.position)))
@@ -110,14 +110,14 @@ def limited_tilt(direction: Vector, maximum: float) -> Vector:
     return x * scale, y * scale, math.cos(maximum)
 
 
-def constrained_goal(mode: Mode, goal: TipGoal) -> TipGoal:
+def constrained_goal(mode: Gesture, goal: TipGoal) -> TipGoal:
     """Apply the constraint of a mode to a goal; G_sign in Lai et al., Eqs. (19), (20).
 
     The printed matrices do not do what the text says (erratum GS-13); the text is followed: V-sign and
     thumbs-up keep only the height, thumbs-up points straight. Palm and fist leave the goal as it is.
     """
-    if mode is Mode.V_SIGN:
+    if mode is Gesture.V_SIGN:
         return TipGoal((0.0, 0.0, goal.position[2]), goal.direction)
-    if mode is Mode.THUMBS_UP:
+    if mode is Gesture.THUMBS_UP:
         return TipGoal((0.0, 0.0, goal.position[2]), (0.0, 0.0, 1.0))
     return goal

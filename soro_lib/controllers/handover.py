@@ -240,7 +240,7 @@ class HandoverController:
         Whatever is seen, the command stays within the arm's and the motors' limits; see :class:`SafetyRules`.
         """
         if self.mode in (Mode.GRASP, Mode.RELEASE, Mode.STOPPED):
-            return self._command(self.mode, self._retreat_reason)
+            return self._command(self._retreat_reason)
         if self.mode is Mode.RETREAT:
             return self._retreat(self._retreat_reason)
         looked, reason = self._believable(observation)
@@ -268,7 +268,7 @@ class HandoverController:
         self.q_sys = step.q_sys
         self._held = 0
         self.mode = self._task_mode
-        return self._command(self.mode, "", error, estimate, measured, goal, step.crops)
+        return self._command("", error, estimate, measured, goal, step.crops)
 
     def _estimate(self, measured: NDArray[np.float64]) -> ShapeEstimate:
         """Return ``q_est`` = SOF(q_sys, X_meas), Eq. (16); or q_sys itself where the optimisation is left
@@ -300,7 +300,7 @@ class HandoverController:
         self, measured: NDArray[np.float64], goal: NDArray[np.float64], error: float
     ) -> HandoverCommand:
         self._enter(Mode.RELEASE if self._task_mode is Mode.CARRY else Mode.GRASP)
-        return self._command(self.mode, "", error, None, measured, goal)
+        return self._command("", error, None, measured, goal)
 
     def _enter(self, mode: Mode) -> None:
         """Begin a stage of the task: the gripper closes to grasp and carry, and opens to release."""
@@ -377,7 +377,7 @@ class HandoverController:
         if self._held > self.parameters.safety.hold_limit:
             return self._retreat(f"held for {self.parameters.safety.hold_limit} steps: {reason}")
         self.mode = Mode.HOLD
-        return self._command(Mode.HOLD, reason)
+        return self._command(reason)
 
     def _retreat(self, reason: str) -> HandoverCommand:
         """Go home open loop: a straight way within the limits, which are convex in `q_sys`, with an open
@@ -389,11 +389,10 @@ class HandoverController:
         if np.abs(self.q_sys - self.arm.home).max() < 0.01:
             self.q_sys = self.arm.home.copy()
             self.mode = Mode.STOPPED
-        return self._command(self.mode, reason)
+        return self._command(reason)
 
     def _command(
         self,
-        mode: Mode,
         reason: str,
         error: float = np.nan,
         estimate: ShapeEstimate | None = None,
@@ -407,7 +406,7 @@ class HandoverController:
         return HandoverCommand(
             tendon_change=clipped,
             gripper_closed=self.gripper_closed,
-            mode=mode,
+            mode=self.mode,
             reason=reason,
             error=error,
             q_sys=self.q_sys.copy(),

@@ -1,6 +1,7 @@
 """The online estimator: learn the fibre from the camera, then fuse the two (Wang et al., Sec. II)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -78,11 +79,11 @@ class PoseEstimate:
     pose: Array
     camera_pose: Array
     fibre_pose: Array
-    fibre_variance: float
-    posterior_error: float
-    error: float
-    learned: bool
-    masked: int
+    fibre_variance: float = np.inf
+    posterior_error: float = np.nan
+    error: float = np.inf
+    learned: bool = False
+    masked: int = 0
     note: str = ""
 
 
@@ -112,7 +113,7 @@ class VisualStrainEstimator:
         self._time = -np.inf
         self._camera_pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         self._fibre_pose = np.full(POSE_SIZE, np.nan)
-        self._last: PoseEstimate | None = None
+        self._fused_pose = self._camera_pose
 
     def update(
         self,
@@ -148,7 +149,7 @@ class VisualStrainEstimator:
         """
         shift = numbers("shift", shift, (self.network.centres.shape[1],))
         if not time > self._time:
-            return self._repeat(f"time stamp {time} does not follow {self._time}")
+            return self._estimate(self._fused_pose, note=f"time stamp {time} does not follow {self._time}")
         self._time = time
         error = self._watch_camera(camera_pose, reprojection_error, inliers)
         shift, masked, whole = self._watch_fibre(shift, error)
@@ -166,11 +167,7 @@ class VisualStrainEstimator:
         pose = fuse_poses(
             self._camera_pose, self._fibre_pose, error, lower=self.settings.lower, upper=self.settings.upper
         )
-        return self._remember(
-            PoseEstimate(
-                pose, self._camera_pose, self._fibre_pose, variance, posterior, error, learnable, masked, note
-            )
-        )
+        return self._estimate(pose, variance, posterior, error, learnable, masked, note)
 
     def _watch_camera(self, pose: ArrayLike | None, reprojection_error: float, inliers: float) -> float:
         """Keep the latest valid camera pose; return the error the fusion shall act on."""
@@ -206,32 +203,9 @@ class VisualStrainEstimator:
             self.network.fit(self._shifts, self._labels)
             if self.settings.grating_noise > 0.0:
                 self._mask = GratingMask(self._shifts, noise=self.settings.grating_noise)
-        return self._remember(
-            PoseEstimate(
-                pose=self._camera_pose,
-                camera_pose=self._camera_pose,
-                fibre_pose=self._fibre_pose,
-                fibre_variance=np.inf,
-                posterior_error=np.nan,
-                error=error,
-                learned=learnable,
-                masked=masked,
-            )
-        )
+        return self._estimate(self._camera_pose, error=error, learned=learnable, masked=masked)
 
-    def _remember(self, estimate: PoseEstimate) -> PoseEstimate:
-        self._last = estimate
-        return estimate
-
-    def _repeat(self, note: str) -> PoseEstimate:
-        return PoseEstimate(
-            pose=self._camera_pose if self._last is None else self._last.pose,
-            camera_pose=self._camera_pose,
-            fibre_pose=self._fibre_pose,
-            fibre_variance=np.inf,
-            posterior_error=np.nan,
-            error=np.inf,
-            learned=False,
-            masked=0,
-            note=note,
-        )
+    def _estimate(self, pose: Array, *known: Any, **more: Any) -> PoseEstimate:
+        """Return the estimate with this fused pose and the sensors' latest, and remember the pose."""
+        self._fused_pose = pose
+        return PoseEstimate(pose, self._camera_pose, self._fibre_pose, *known, **more)

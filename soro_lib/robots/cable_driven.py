@@ -150,7 +150,7 @@ class CableDrivenArm(Robot):
         """Return d configuration / d actuation, shape (..., 9 or 15, 7)."""
         forces, moments = self._loads(self.check(actuation))
         lengths = self.segment_length - forces / self.axial_stiffness
-        force_slope, moment_slope = self._load_slopes
+        force_slope, moment_slope = self.load_slopes
         length_slope = -force_slope / self.axial_stiffness
         soft = np.zeros((*forces.shape, 3, 7))
         soft[..., :2, :] = (
@@ -165,11 +165,7 @@ class CableDrivenArm(Robot):
 
     def mid_point(self, actuation: ArrayLike) -> FloatArray:
         """Return the end of the proximal segment and its cap [m], shape (..., 3): frame {M} of the paper."""
-        return self.mid_pose(actuation)[..., :3, 3]
-
-    def mid_pose(self, actuation: ArrayLike) -> FloatArray:
-        """Return the pose of frame {M} in the base frame, shape (..., 4, 4)."""
-        return chain_transform(self.configuration(actuation)[..., : self._mid_pieces, :])
+        return chain_transform(self.configuration(actuation)[..., : self._mid_pieces, :])[..., :3, 3]
 
     def mid_jacobian(self, actuation: ArrayLike) -> FloatArray:
         """Return the Jacobian of {M}, shape (..., 6, 7): the linear rows are J_M of Lai et al., Eq. (27)."""
@@ -178,8 +174,11 @@ class CableDrivenArm(Robot):
         return chain_jacobian(pieces) @ self.configuration_jacobian(actuation)[..., : 3 * count, :]
 
     @cached_property
-    def _load_slopes(self) -> tuple[FloatArray, FloatArray]:
-        """Axial forces (2, 7) and moment vectors (2, 2, 7) per unit of actuation; rows: proximal, distal."""
+    def load_slopes(self) -> tuple[FloatArray, FloatArray]:
+        """Axial forces (2, 7) and moment vectors (2, 2, 7) per unit of actuation; rows: proximal, distal.
+
+        The sums in Lai et al., Eqs. (1)-(3); the compiled kinematics take them from here.
+        """
         tension = -np.eye(7)[1:].reshape(2, 3, 7)
         directions = self.cable_radius * np.stack([np.cos(CABLE_ANGLES), np.sin(CABLE_ANGLES)])
         own_force, own_moment = tension.sum(axis=1), directions @ tension
@@ -189,7 +188,7 @@ class CableDrivenArm(Robot):
 
     def _loads(self, actuation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return axial forces (..., 2) [N] and moment vectors (..., 2, 2) [N m] of the two segments."""
-        force_slope, moment_slope = self._load_slopes
+        force_slope, moment_slope = self.load_slopes
         return actuation @ force_slope.T, np.tensordot(actuation, moment_slope, axes=(-1, -1))
 
     @property

@@ -162,22 +162,14 @@ class HandoverVision:
         if apart > self.largest_disagreement:
             pose = ball = None
             trouble = f"the cameras put the wrist {1e3 * apart:.0f} mm apart: swapped or moved?"
+        status = "; ".join(text for text in (trouble, *complaints) if text)
+        observation = HandoverObservation(None, None, ball, disagreement=gap, status=status)
         if pose is not None:
             gripper = pose.wrist + self.gripper_length * pose.direction
             self._last_points = np.concatenate([pose.wrist, gripper])
-        status = "; ".join(text for text in (trouble, *complaints) if text)
-        observation = HandoverObservation(
-            wrist=None if pose is None else pose.wrist,
-            direction=None if pose is None else pose.direction,
-            ball=ball,
-            disagreement=gap,
-            status=status,
-        )
-        if pose is not None:
-            observation = replace(
-                observation,
-                wrist_deviation=pose.wrist_deviation,
-                direction_deviation=pose.direction_deviation,
+            deviations = pose.wrist_deviation, pose.direction_deviation
+            observation = HandoverObservation(
+                pose.wrist, pose.direction, ball, *deviations, disagreement=gap, status=status
             )
         if ball is not None:
             clear = min(sight.fill for sight in chosen if sight is not None) > CLEAR_FILL

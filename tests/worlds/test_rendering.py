@@ -16,7 +16,7 @@ from soro_lib.worlds.rendering import (
     motion_kernel,
     render,
 )
-from soro_lib.worlds.round_bodies import Sphere
+from soro_lib.worlds.round_bodies import Ball
 
 PINHOLE = Camera(320, 240, 260.0)
 DISTORTING = Camera(320, 240, 260.0, principal_point=(162.0, 118.0), distortion=(0.06, -0.10, 0.001, -0.002))
@@ -89,10 +89,10 @@ def test_a_quad_is_invisible_from_behind_and_a_polygon_is_not():
 
 
 def test_the_near_thing_hides_the_far_one_and_layers_come_first():
-    near, far = Sphere(np.array([0, 0, 0.5]), 0.05, 250), Sphere(np.array([0, 0, 0.9]), 0.2, 100)
+    near, far = Ball(np.array([0, 0, 0.5]), 0.05, 250), Ball(np.array([0, 0, 0.9]), 0.2, 100)
     assert render(PINHOLE, np.eye(4), [near, far])[120, 160] == 250
     assert render(PINHOLE, np.eye(4), [far, near])[120, 160] == 250
-    covering = Sphere(np.array([0, 0, 0.9]), 0.2, 100, layer=1)
+    covering = Ball(np.array([0, 0, 0.9]), 0.2, 100, layer=1)
     assert render(PINHOLE, np.eye(4), [near, covering])[120, 160] == 100
 
 
