@@ -28,11 +28,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import finite, number
-
-FloatArray = NDArray[np.float64]
+from soro_lib.checks import Array, finite, number
 
 # Below this squared bend the derivatives of S and C are summed as power series: there the closed forms would
 # lose digits to cancellation, above it seven terms would leave more than the rounding error.
@@ -52,7 +50,7 @@ ARCS = (..., "n >= 0", 3)
 """Shape of a chain of arcs, or of many: n times (dx, dy, length)."""
 
 
-def arc_transform(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray:
+def arc_transform(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> Array:
     """Return the pose of the end of an arc in the frame of its start.
 
     Parameters
@@ -95,7 +93,7 @@ def arc_transform(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray
     return chain_transform(arc[..., np.newaxis, :])
 
 
-def chain_transform(configuration: ArrayLike) -> FloatArray:
+def chain_transform(configuration: ArrayLike) -> Array:
     """Return the pose of the end of a chain of arcs in the frame of its start.
 
     Parameters
@@ -135,7 +133,7 @@ def chain_transform(configuration: ArrayLike) -> FloatArray:
     return _pack_transform(frame, arcs.shape[:-2])
 
 
-def chain_jacobian(configuration: ArrayLike) -> FloatArray:
+def chain_jacobian(configuration: ArrayLike) -> Array:
     """Return the Jacobian of the end of a chain of arcs with respect to all its arc coordinates.
 
     Parameters
@@ -157,7 +155,7 @@ def chain_jacobian(configuration: ArrayLike) -> FloatArray:
     return chain_transform_and_jacobian(configuration)[1]
 
 
-def chain_transform_and_jacobian(configuration: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def chain_transform_and_jacobian(configuration: ArrayLike) -> tuple[Array, Array]:
     """Return :func:`chain_transform` and :func:`chain_jacobian` from one pass along the chain."""
     arcs = finite("configuration", configuration, ARCS)
     if arcs.ndim == 2:
@@ -165,7 +163,7 @@ def chain_transform_and_jacobian(configuration: ArrayLike) -> tuple[FloatArray, 
     return _batch_transform_and_jacobian(arcs)
 
 
-def backbone(configuration: ArrayLike, points_per_segment: int = 20) -> FloatArray:
+def backbone(configuration: ArrayLike, points_per_segment: int = 20) -> Array:
     """Return points along the chain, for drawing it and for measuring distances to it.
 
     Parameters
@@ -198,7 +196,7 @@ def backbone(configuration: ArrayLike, points_per_segment: int = 20) -> FloatArr
     return np.moveaxis(np.concatenate(points, axis=-1), 0, -1).reshape(*arcs.shape[:-2], -1, 3)
 
 
-def routing_matrix(radius: float, angles: ArrayLike) -> FloatArray:
+def routing_matrix(radius: float, angles: ArrayLike) -> Array:
     """Return the matrix from an arc to the lengths of the tendons or chambers that run along it.
 
     A strand at distance `radius` from the backbone and at angle `angle` about z keeps its place in every
@@ -260,7 +258,7 @@ def _cross(a: Any, b: Any) -> tuple[Any, Any, Any]:
 # one arc are also compiled, as they stand, by `soro_lib.arc_kernels` (njit).
 
 
-def _scalar_arcs(arcs: FloatArray) -> list[tuple[float, ...]]:
+def _scalar_arcs(arcs: Array) -> list[tuple[float, ...]]:
     """Return (dx, dy, length, sinc, versinc, cosine) of every arc of one chain, as floats."""
     return [arc_numbers(dx, dy, length) for dx, dy, length in arcs.tolist()]
 
@@ -293,7 +291,7 @@ def arc_slopes(arc: Sequence[float]) -> tuple[float, float]:
     return sinc_slope, versinc_slope
 
 
-def _scalar_transform_and_jacobian(arcs: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _scalar_transform_and_jacobian(arcs: Array) -> tuple[Array, Array]:
     rows = _IDENTITY_ROWS
     ends = []
     for arc in _scalar_arcs(arcs):
@@ -317,24 +315,24 @@ def _scalar_transform_and_jacobian(arcs: FloatArray) -> tuple[FloatArray, FloatA
 # Many chains: every number above becomes an array over the chains, every vector one of shape (3, chains).
 
 
-def _batch_arcs(arcs: FloatArray) -> list[tuple[FloatArray, ...]]:
+def _batch_arcs(arcs: Array) -> list[tuple[Array, ...]]:
     """Return (dx, dy, length, sinc, versinc, cosine) of every arc, each an array over the chains."""
     columns = np.ascontiguousarray(_flat_batch(arcs).T)
     return [_batch_arc(*arc) for arc in columns.transpose(1, 0, 2)]
 
 
-def _flat_batch(arcs: FloatArray) -> FloatArray:
+def _flat_batch(arcs: Array) -> Array:
     return arcs.reshape(math.prod(arcs.shape[:-2]), *arcs.shape[-2:])
 
 
-def _batch_arc(dx: FloatArray, dy: FloatArray, length: FloatArray) -> tuple[FloatArray, ...]:
+def _batch_arc(dx: Array, dy: Array, length: Array) -> tuple[Array, ...]:
     half = 0.5 * np.hypot(dx, dy)
     half_sine = np.sin(half)
     half_sinc = np.divide(half_sine, half, out=np.ones_like(half), where=half > 0.0)
     return dx, dy, length, half_sinc * np.cos(half), 0.5 * half_sinc**2, 1.0 - 2.0 * half_sine**2
 
 
-def _batch_slopes(arc: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+def _batch_slopes(arc: Sequence[Array]) -> tuple[Array, Array]:
     dx, dy, _, sinc, versinc, cosine = arc
     square = dx * dx + dy * dy
     small = square < _SERIES_BOUND
@@ -353,13 +351,13 @@ def _horner(coefficients: Sequence[float], x: Any) -> Any:
     return value
 
 
-def _identity_frame(arcs: FloatArray) -> tuple[FloatArray, ...]:
+def _identity_frame(arcs: Array) -> tuple[Array, ...]:
     """Return the columns of an identity frame, each of shape (3, number of chains)."""
     chains = math.prod(arcs.shape[:-2])
     return tuple(np.broadcast_to(column[:, np.newaxis], (3, chains)) for column in np.eye(4)[:, :3])
 
 
-def _pack_transform(frame: Sequence[FloatArray], batch_shape: tuple[int, ...]) -> FloatArray:
+def _pack_transform(frame: Sequence[Array], batch_shape: tuple[int, ...]) -> Array:
     transform = np.empty((frame[0].shape[1], 4, 4))
     for index, column in enumerate(frame):
         transform[:, :3, index] = column.T
@@ -367,7 +365,7 @@ def _pack_transform(frame: Sequence[FloatArray], batch_shape: tuple[int, ...]) -
     return transform.reshape(*batch_shape, 4, 4)
 
 
-def _batch_transform_and_jacobian(arcs: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _batch_transform_and_jacobian(arcs: Array) -> tuple[Array, Array]:
     batch_shape, count = arcs.shape[:-2], arcs.shape[-2]
     frame = _identity_frame(arcs)
     ends = []

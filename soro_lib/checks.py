@@ -13,6 +13,9 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Array = NDArray[np.float64]
+"""Any array of floats; its shape is in the docstring."""
+
 Vector = tuple[float, float, float]
 """A position or force inside the compiled rules: three floats."""
 
@@ -31,7 +34,7 @@ class Bounds(TypedDict, total=False):
 
 def numbers(
     name: str, value: ArrayLike, shape: Shape | None = None, error: type[ValueError] = ValueError
-) -> NDArray[np.float64]:
+) -> Array:
     """Return numbers of a shape, finite or not, as an array; see :func:`finite`."""
     try:
         array = np.asarray(value, dtype=float)
@@ -49,7 +52,7 @@ def finite(
     shape: Shape | None = None,
     error: type[ValueError] = ValueError,
     **bounds: Unpack[Bounds],
-) -> NDArray[np.float64]:
+) -> Array:
     """Return finite numbers within bounds as an array.
 
     Parameters
@@ -113,7 +116,7 @@ def vector(name: str, value: ArrayLike) -> Vector:
     return x, y, z
 
 
-def increasing(name: str, value: ArrayLike, shape: Shape = ("n",)) -> NDArray[np.float64]:
+def increasing(name: str, value: ArrayLike, shape: Shape = ("n",)) -> Array:
     """Return finite numbers (n,) that increase strictly, or name the first that does not."""
     array = finite(name, value, shape)
     falls = np.flatnonzero(np.diff(array) <= 0.0)

@@ -5,24 +5,22 @@ shape ``(..., d)``. Lengths are in whatever unit the caller gives; the plane is 
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from soro_lib.checks import finite, positive
-
-FloatArray = NDArray[np.float64]
+from soro_lib.checks import Array, finite, positive
 
 A4_PAPER = (0.297, 0.210)
 """Sides of an A4 sheet [m] (ISO 216), the tracing target of Lai et al., Fig. 5."""
 
 
-def circle(turns: ArrayLike, radius: float) -> FloatArray:
+def circle(turns: ArrayLike, radius: float) -> Array:
     """Return points on a circle, counter-clockwise from +x, shape (..., 2): Wang et al., Section IV-D."""
     angle = 2.0 * np.pi * finite("turns", turns)
     return positive("radius", radius) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def infinity(turns: ArrayLike, half_width: float) -> FloatArray:
+def infinity(turns: ArrayLike, half_width: float) -> Array:
     """Return points on Bernoulli's lemniscate, the infinity sign of Lai et al., Fig. 7(a), shape (..., 2).
 
     Parameters
@@ -37,7 +35,7 @@ def infinity(turns: ArrayLike, half_width: float) -> FloatArray:
     return np.stack([x, x * np.cos(angle)], axis=-1)
 
 
-def spiral(fraction: ArrayLike, radius: float, turns: float) -> FloatArray:
+def spiral(fraction: ArrayLike, radius: float, turns: float) -> Array:
     """Return points on a spiral whose radius grows with the square root, shape (..., 2): equal area per time.
 
     Parameters
@@ -55,7 +53,7 @@ def spiral(fraction: ArrayLike, radius: float, turns: float) -> FloatArray:
     return np.stack([reach * np.cos(angle), reach * np.sin(angle)], axis=-1)
 
 
-def polygon(turns: ArrayLike, vertices: ArrayLike) -> FloatArray:
+def polygon(turns: ArrayLike, vertices: ArrayLike) -> Array:
     """Return points on a closed polygon at constant speed, shape (..., d).
 
     Parameters
@@ -74,7 +72,7 @@ def polygon(turns: ArrayLike, vertices: ArrayLike) -> FloatArray:
     return np.stack([np.interp(distance, travelled, column) for column in closed.T], axis=-1)
 
 
-def pentagram(turns: ArrayLike, radius: float) -> FloatArray:
+def pentagram(turns: ArrayLike, radius: float) -> Array:
     """Return points on a five-pointed star of straight lines, shape (..., 2): Wang et al., Fig. 9.
 
     The first point of the star is at +y, at distance `radius` from the centre.
@@ -83,7 +81,7 @@ def pentagram(turns: ArrayLike, radius: float) -> FloatArray:
     return polygon(turns, positive("radius", radius) * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
 
-def rectangle(turns: ArrayLike, width: float = A4_PAPER[0], height: float = A4_PAPER[1]) -> FloatArray:
+def rectangle(turns: ArrayLike, width: float = A4_PAPER[0], height: float = A4_PAPER[1]) -> Array:
     """Return points on the border of a centred rectangle, by default an A4 sheet in metres, shape (..., 2).
 
     Counter-clockwise from the corner (-width/2, -height/2).
@@ -92,7 +90,7 @@ def rectangle(turns: ArrayLike, width: float = A4_PAPER[0], height: float = A4_P
     return polygon(turns, [(-x, -y), (x, -y), (x, y), (-x, y)])
 
 
-def closed_curve(turns: ArrayLike, points: ArrayLike, samples: int = 4096) -> FloatArray:
+def closed_curve(turns: ArrayLike, points: ArrayLike, samples: int = 4096) -> Array:
     """Return points on the smooth closed curve through given points, at constant speed, shape (..., d).
 
     Parameters
@@ -121,7 +119,7 @@ def closed_curve(turns: ArrayLike, points: ArrayLike, samples: int = 4096) -> Fl
     return np.asarray(spline(np.interp(distance, travelled, parameter)), dtype=float)
 
 
-def minimum_jerk(fraction: ArrayLike) -> FloatArray:
+def minimum_jerk(fraction: ArrayLike) -> Array:
     """Return the share of the distance covered after a share of the time, shape (...): Flash and Hogan, 1985.
 
     Parameters

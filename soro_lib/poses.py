@@ -7,7 +7,9 @@ quaternions (scalar last) and rotation vectors are `scipy.spatial.transform.Rota
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from soro_lib.checks import Array
 
 
 def magnitude(vector: ArrayLike) -> float:
@@ -24,7 +26,7 @@ def magnitude(vector: ArrayLike) -> float:
     return math.hypot(*np.asarray(vector, dtype=float).tolist())
 
 
-def align_quaternion(quaternion: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]:
+def align_quaternion(quaternion: ArrayLike, reference: ArrayLike) -> Array:
     """Return the quaternions, shape (..., 4), or their negatives, whichever is nearer to `reference`.
 
     q and -q are the same rotation, so blending or filtering quaternions needs them in one hemisphere first.

@@ -1,12 +1,10 @@
 """The map between stepper and chamber: linear in Wang et al., Eq. (27), fitted to a sweep in Sec. IV-E."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from soro_lib.checks import increasing
-
-Array = NDArray[np.float64]
+from soro_lib.checks import Array, increasing
 
 
 class ActuationMap:

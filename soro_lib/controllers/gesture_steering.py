@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import check_fields, finite
+from soro_lib.checks import Array, check_fields, finite
 from soro_lib.controllers.gestures import Gesture, GestureRule
 from soro_lib.controllers.hand_gate import GatedHand, GateSettings, HandGate
 from soro_lib.controllers.hand_mapping import PalmMapping, TipGoal, Vector
@@ -34,8 +34,6 @@ from soro_lib.robots import CableDrivenArm
 from soro_lib.robots.base import Robot
 from soro_lib.robots.cable_driven_kernels import Kinematics, compiled_kinematics, generic_kinematics
 from soro_lib.sensing.hand_tracking import HandSample
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

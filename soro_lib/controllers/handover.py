@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import check_fields
+from soro_lib.checks import Array, check_fields
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
 from soro_lib.estimators.handover_filters import APPENDIX_A, FilterParameters, HandoverFilters
 from soro_lib.estimators.shape_estimation import POSE_WEIGHTS, ShapeEstimate, estimate_shape
@@ -160,21 +160,21 @@ class HandoverCommand:
         Limits met in this step.
     """
 
-    tendon_change: NDArray[np.float64]
+    tendon_change: Array
     gripper_closed: bool
     mode: Mode
     reason: str
     error: float
-    q_sys: NDArray[np.float64]
-    q_est: NDArray[np.float64] | None
-    measured_points: NDArray[np.float64]
-    goal_points: NDArray[np.float64]
-    ball: NDArray[np.float64]
+    q_sys: Array
+    q_est: Array | None
+    measured_points: Array
+    goal_points: Array
+    ball: Array
     estimate_residual: float
     crops: int
 
 
-def goal_over(ball: ArrayLike, height: float, gripper_length: float) -> NDArray[np.float64]:
+def goal_over(ball: ArrayLike, height: float, gripper_length: float) -> Array:
     """Return ``X_goal`` (6,): the gripper upright at a height over the ball, the wrist above it [m] (Section
     3.5).
 
@@ -185,7 +185,7 @@ def goal_over(ball: ArrayLike, height: float, gripper_length: float) -> NDArray[
     return np.concatenate([gripper + gripper_length * UP, gripper])
 
 
-def softened_weights(q_sys: ArrayLike, weights: ArrayLike, softening: float) -> NDArray[np.float64]:
+def softened_weights(q_sys: ArrayLike, weights: ArrayLike, softening: float) -> Array:
     """Return ``A_pose,upd`` (9,) with less weight where gravity has more hold (Vervloet, Section 5.4.3).
 
     A segment's weight falls with its own bend and with the bends of the segments above it [1/rad].
@@ -214,12 +214,12 @@ class HandoverController:
         self.filters = HandoverFilters(self.parameters.filters, self.arm.tip_points(self.arm.home))
         self.mode = Mode.APPROACH
         self.gripper_closed = False
-        self.place: NDArray[np.float64] | None = None
+        self.place: Array | None = None
         self._expected_move = np.zeros(6)
         self._task_mode = Mode.APPROACH
-        self._last_wrist: NDArray[np.float64] | None = None
-        self._last_seen: dict[str, NDArray[np.float64]] = {}
-        self._jumped_to: dict[str, NDArray[np.float64]] = {}
+        self._last_wrist: Array | None = None
+        self._last_seen: dict[str, Array] = {}
+        self._jumped_to: dict[str, Array] = {}
         self._looks_after_jump = {"wrist": 0, "ball": 0}
         self._repeats = 0
         self._ball_unseen = 0
@@ -270,7 +270,7 @@ class HandoverController:
         self.mode = self._task_mode
         return self._command("", error, estimate, measured, goal, step.crops)
 
-    def _estimate(self, measured: NDArray[np.float64]) -> ShapeEstimate:
+    def _estimate(self, measured: Array) -> ShapeEstimate:
         """Return ``q_est`` = SOF(q_sys, X_meas), Eq. (16); or q_sys itself where the optimisation is left
         out."""
         parameters = self.parameters
@@ -283,7 +283,7 @@ class HandoverController:
         bound = parameters.pose_bound + parameters.pose_bound_share * self.filters.points_deviation
         return estimate_shape(self.q_sys, measured, bound, weights, self.arm.gripper_length)
 
-    def _goal(self, measured: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _goal(self, measured: Array) -> Array:
         """Return ``X_goal`` of the stage; the second stage begins when the first goal is reached."""
         length = self.arm.gripper_length
         if self._task_mode is Mode.CARRY and self.place is not None:
@@ -296,9 +296,7 @@ class HandoverController:
             self._enter(Mode.DESCEND)
         return goal_over(ball, 0.0, length)
 
-    def _arrive(
-        self, measured: NDArray[np.float64], goal: NDArray[np.float64], error: float
-    ) -> HandoverCommand:
+    def _arrive(self, measured: Array, goal: Array, error: float) -> HandoverCommand:
         self._enter(Mode.RELEASE if self._task_mode is Mode.CARRY else Mode.GRASP)
         return self._command("", error, None, measured, goal)
 
@@ -345,7 +343,7 @@ class HandoverController:
         deviations = (look.wrist_deviation, look.direction_deviation, look.ball_deviation)
         return HandoverObservation(wrist, direction, ball, *deviations), reason
 
-    def _without_jump(self, name: str, point: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    def _without_jump(self, name: str, point: Array | None) -> Array | None:
         """Return the point, or None if it jumped and has not stayed where it jumped to."""
         if point is None:
             return None
@@ -396,8 +394,8 @@ class HandoverController:
         reason: str,
         error: float = np.nan,
         estimate: ShapeEstimate | None = None,
-        measured: NDArray[np.float64] | None = None,
-        goal: NDArray[np.float64] | None = None,
+        measured: Array | None = None,
+        goal: Array | None = None,
         crops: int = 0,
     ) -> HandoverCommand:
         change = self.arm.tendon_lengths(self.q_sys) - self._calibrated_tendons
@@ -419,7 +417,7 @@ class HandoverController:
         )
 
 
-def finite(vector: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+def finite(vector: Array | None) -> Array | None:
     """Return the vector, or None if it is missing or not finite."""
     if vector is None or not np.isfinite(vector).all():
         return None

@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import check_fields, finite, one_of
+from soro_lib.checks import Array, check_fields, finite, one_of
 from soro_lib.estimators.gaussian_process import RollingGaussianProcess
 from soro_lib.robots.base import Robot
-
-Array = NDArray[np.float64]
 
 MILLIMETRE = 1e-3
 COMPENSATIONS = ("none", "quadratic", "literal", "relative", "additive")

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from soro_lib.arcs import backbone, chain_transform_and_jacobian
-from soro_lib.checks import check_fields
+from soro_lib.checks import Array, check_fields
 from soro_lib.controllers.steering_step import Clearance
 from soro_lib.robots.base import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

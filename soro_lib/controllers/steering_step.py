@@ -21,13 +21,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import check_fields
+from soro_lib.checks import Array, check_fields
 from soro_lib.robots.cable_driven_kernels import Kinematics
 
 if TYPE_CHECKING:
     import cvxpy
 
-Array = NDArray[np.float64]
 
 MILLIMETRE = 1e-3
 CABLE_UNITS = np.array([MILLIMETRE] + [1.0] * 6)

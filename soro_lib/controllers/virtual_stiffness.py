@@ -15,9 +15,9 @@ from typing import Literal
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import check_fields, finite, one_of
+from soro_lib.checks import Array, check_fields, one_of
 from soro_lib.poses import magnitude
 from soro_lib.robots.helix import HelixArm
 from soro_lib.robots.helix_kernels import (
@@ -31,8 +31,6 @@ from soro_lib.robots.helix_kernels import (
     tip_points_and_jacobian,
     unreachable_direction,
 )
-
-Array = NDArray[np.float64]
 
 HELIX = HelixArm()
 """The arm of the thesis."""
@@ -146,20 +144,20 @@ def limit_state(q: ArrayLike, inverse_stiffness: ArrayLike, arm: HelixArm = HELI
     ----------
     q : array_like, shape (9,)
         State (dx [rad], dy [rad], length [m] per segment).
-    inverse_stiffness : array_like, shape (9,) or (9, 9)
-        ``K^-1``, its diagonal or the diagonal matrix.
+    inverse_stiffness : array_like, shape (9,)
+        Diagonal of ``K^-1``.
     arm : HelixArm
         Whose limits hold; the thesis's, Eq. (11), unless given.
 
     Returns
     -------
     q, inverse_stiffness : ndarray
-        In the shapes given; the arguments are not changed.
+        Shape (9,) each; the arguments are not changed.
 
     Raises
     ------
     ValueError
-        If a shape is wrong or the state is not finite.
+        If a shape is wrong or a number is not finite.
 
     Examples
     --------
@@ -167,14 +165,8 @@ def limit_state(q: ArrayLike, inverse_stiffness: ArrayLike, arm: HelixArm = HELI
     >>> q[:3].round(3).tolist(), softness[:3].tolist()
     ([0.785, 0.0, 0.14], [0.01, 1.0, 0.01])
     """
-    state = finite("q", q, (9,)).copy()
-    softness = np.array(inverse_stiffness, dtype=float)
-    if softness.shape not in ((9,), (9, 9)):
-        raise ValueError(f"inverse_stiffness must have shape (9,) or (9, 9), got {softness.shape}")
-    diagonal = softness.diagonal().copy() if softness.ndim == 2 else softness
-    limit_state_in_place(state, diagonal, *state_limits(arm))
-    if softness.ndim == 2:
-        np.fill_diagonal(softness, diagonal)
+    state, softness = kernel_vector("q", q, 9), kernel_vector("inverse_stiffness", inverse_stiffness, 9)
+    limit_state_in_place(state, softness, *state_limits(arm))
     return state, softness
 
 

@@ -10,14 +10,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.blas import dsymv, dsyr
 
-from soro_lib.checks import finite, number, numbers, positive
+from soro_lib.checks import Array, finite, number, numbers, positive
 from soro_lib.poses import align_quaternion
-
-Array = NDArray[np.float64]
 
 POSE_SIZE = 7
 IDENTITY_QUATERNION = np.array([0.0, 0.0, 0.0, 1.0])

@@ -7,11 +7,9 @@ the inverse of the kernel matrix follows a replaced sample by two rank-one corre
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import finite, number, positive
-
-Array = NDArray[np.float64]
+from soro_lib.checks import Array, finite, number, positive
 
 
 class RollingGaussianProcess:

@@ -10,9 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import finite, number, numbers, positive
-
-Array = NDArray[np.float64]
+from soro_lib.checks import Array, finite, number, numbers, positive
 
 REFRESH = 10
 """Number of learned samples after which the model is inverted anew."""

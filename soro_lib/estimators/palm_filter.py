@@ -12,11 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import check_fields, finite, positive
-
-Array = NDArray[np.float64]
+from soro_lib.checks import Array, check_fields, finite, positive
 
 MEASURED: Array = np.kron(np.eye(3), np.eye(2, 3)).astype(np.float64)
 """Observation matrix H (6, 9): position and velocity of each axis; Lai et al., Eq. (8)."""

@@ -1,12 +1,10 @@
 """Fusing the camera's pose with the fibre's (Wang et al., Sec. II-D, Eq. (18), corrected)."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import number, numbers, positive
+from soro_lib.checks import Array, number, numbers, positive
 from soro_lib.estimators.extreme_learning_machine import same_hemisphere, unit_quaternion
-
-Array = NDArray[np.float64]
 
 
 def fibre_weight(reprojection_error: ArrayLike, lower: float, upper: float) -> Array:
@@ -72,7 +70,7 @@ def blend_poses(camera_pose: ArrayLike, fibre_pose: ArrayLike, weight: ArrayLike
     """
     camera = numbers("camera_pose", camera_pose, (..., 7))
     fibre = numbers("fibre_pose", fibre_pose, (..., 7))
-    has_camera, has_fibre = np.isfinite(camera).all(axis=-1), np.isfinite(fibre).all(axis=-1)
+    has_camera, has_fibre = (np.asarray(np.isfinite(pose).all(axis=-1)) for pose in (camera, fibre))
     if not (has_camera & has_fibre).all():
         if not (has_camera | has_fibre).all():
             raise ValueError("neither the camera's nor the fibre's pose is finite")

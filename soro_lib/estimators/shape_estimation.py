@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import positive
+from soro_lib.checks import Array, positive
 from soro_lib.poses import magnitude
 from soro_lib.robots.helix_kernels import (
     cholesky,
@@ -25,8 +25,6 @@ from soro_lib.robots.helix_kernels import (
     tip_points_and_jacobian,
     unreachable_direction,
 )
-
-Array = NDArray[np.float64]
 
 GRIPPER_LENGTH = 0.10
 """Distance from wrist to gripper [m] (Vervloet, Appendix A)."""

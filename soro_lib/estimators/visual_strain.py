@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import check_fields, numbers
+from soro_lib.checks import Array, check_fields, numbers
 from soro_lib.estimators.extreme_learning_machine import POSE_SIZE, ExtremeLearningMachine
 from soro_lib.estimators.grating_mask import GratingMask
 from soro_lib.estimators.pose_fusion import fuse_poses, inlier_weighted_error
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.arcs import backbone, chain_jacobian, chain_transform
-from soro_lib.checks import finite, numbers
-
-FloatArray = NDArray[np.float64]
+from soro_lib.checks import Array, finite, numbers
 
 LIMIT_TOLERANCE = 1e-9
 """Share of an actuator's range by which rounding may exceed a limit."""
@@ -44,9 +42,9 @@ class ClippedActuation:
         Requested minus admissible value, in the unit of the actuator.
     """
 
-    actuation: FloatArray
+    actuation: Array
     clipped: NDArray[np.bool_]
-    excess: FloatArray
+    excess: Array
 
     @property
     def any_clipped(self) -> bool:
@@ -65,29 +63,29 @@ class Robot(Protocol):
     actuator_names: tuple[str, ...]
 
     @property
-    def lower(self) -> FloatArray:
+    def lower(self) -> Array:
         """Lower actuator limits, shape (n,)."""
         ...
 
     @property
-    def upper(self) -> FloatArray:
+    def upper(self) -> Array:
         """Upper actuator limits, shape (n,)."""
         ...
 
     @property
-    def home(self) -> FloatArray:
+    def home(self) -> Array:
         """Actuation at rest, shape (n,)."""
         ...
 
-    def configuration(self, actuation: ArrayLike) -> FloatArray:
+    def configuration(self, actuation: ArrayLike) -> Array:
         """Return the pieces of the arm from base to tip, shape (..., m, 3) of (dx, dy, length)."""
         ...
 
-    def configuration_jacobian(self, actuation: ArrayLike) -> FloatArray:
+    def configuration_jacobian(self, actuation: ArrayLike) -> Array:
         """Return the derivative of the flattened configuration, shape (..., 3 m, n)."""
         ...
 
-    def forward(self, actuation: ArrayLike) -> FloatArray:
+    def forward(self, actuation: ArrayLike) -> Array:
         """Return the tip pose in the base frame, shape (..., 4, 4).
 
         Raises
@@ -97,7 +95,7 @@ class Robot(Protocol):
         """
         return chain_transform(self.configuration(actuation))
 
-    def jacobian(self, actuation: ArrayLike) -> FloatArray:
+    def jacobian(self, actuation: ArrayLike) -> Array:
         """Return the tip Jacobian, shape (..., 6, n): linear, then angular velocity in the base frame.
 
         Raises
@@ -107,15 +105,15 @@ class Robot(Protocol):
         """
         return chain_jacobian(self.configuration(actuation)) @ self.configuration_jacobian(actuation)
 
-    def tip(self, actuation: ArrayLike) -> FloatArray:
+    def tip(self, actuation: ArrayLike) -> Array:
         """Return the tip position in the base frame [m], shape (..., 3)."""
         return self.forward(actuation)[..., :3, 3]
 
-    def backbone(self, actuation: ArrayLike, points_per_segment: int = 20) -> FloatArray:
+    def backbone(self, actuation: ArrayLike, points_per_segment: int = 20) -> Array:
         """Return points [m] along the arm in the base frame, shape (..., k, 3); see `arcs.backbone`."""
         return backbone(self.configuration(actuation), points_per_segment)
 
-    def check(self, actuation: ArrayLike) -> FloatArray:
+    def check(self, actuation: ArrayLike) -> Array:
         """Return the actuation as an array, shape (..., n), if it lies within the limits.
 
         Both limits are admissible; rounding may exceed them by `LIMIT_TOLERANCE` of the range.
@@ -150,6 +148,6 @@ class Robot(Protocol):
         return report_clipping(requested, np.clip(requested, self.lower, self.upper))
 
 
-def report_clipping(requested: FloatArray, admissible: FloatArray) -> ClippedActuation:
+def report_clipping(requested: Array, admissible: Array) -> ClippedActuation:
     """Return the admissible actuation and the report of how it differs from the requested one."""
     return ClippedActuation(admissible, admissible != requested, requested - admissible)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from soro_lib.arcs import chain_jacobian, chain_transform
-from soro_lib.checks import check_fields, one_of
-from soro_lib.robots.base import FloatArray, Robot
+from soro_lib.checks import Array, check_fields, one_of
+from soro_lib.robots.base import Robot
 
 CABLE_ANGLES = 2.0 * np.pi / 3.0 * np.arange(3)
 """Directions of the three cables of a segment about z [rad]."""
@@ -102,26 +102,26 @@ class CableDrivenArm(Robot):
         """K_a = EA / L of an unloaded segment [N/m] (Lai et al., Table I)."""
         return self.axial_rigidity / self.segment_length
 
-    def bending_stiffness(self, length: ArrayLike) -> FloatArray:
+    def bending_stiffness(self, length: ArrayLike) -> Array:
         """K_T = EI / length [N m/rad] of a segment compressed to `length` [m] (Lai et al., Table I)."""
         return self.bending_rigidity / np.asarray(length, dtype=float)
 
     @cached_property
-    def lower(self) -> FloatArray:
+    def lower(self) -> Array:
         """Lower limits: slide [m], then six cable commands (Lai et al., below Eq. (26))."""
         return np.array([0.0] + 6 * [-self.maximum_tension])
 
     @cached_property
-    def upper(self) -> FloatArray:
+    def upper(self) -> Array:
         """Upper limits: slide [m], then six cable commands (Lai et al., below Eq. (26))."""
         return np.array([self.slide_length] + 6 * [0.0])
 
     @cached_property
-    def home(self) -> FloatArray:
+    def home(self) -> Array:
         """Straight and unloaded; the slide at 50 mm where its stroke allows (Table II, configuration 0)."""
         return np.array([min(0.05, self.slide_length)] + 6 * [0.0])
 
-    def segments(self, actuation: ArrayLike) -> FloatArray:
+    def segments(self, actuation: ArrayLike) -> Array:
         """Return the two soft segments, shape (..., 2, 3) of (dx, dy, length), proximal first.
 
         Lai et al., Eqs. (1)-(3) as one vector equation (errata GS-1 and GS-2): the moments of the cables add
@@ -132,7 +132,7 @@ class CableDrivenArm(Robot):
         bends = moments * lengths[..., np.newaxis] / self.bending_rigidity
         return np.concatenate([bends, lengths[..., np.newaxis]], axis=-1)
 
-    def configuration(self, actuation: ArrayLike) -> FloatArray:
+    def configuration(self, actuation: ArrayLike) -> Array:
         """Return slide, proximal segment, cap, distal segment, cap as pieces (dx, dy, length).
 
         Rigid pieces are straight arcs, so that the whole arm is one chain. Without caps there are three
@@ -146,7 +146,7 @@ class CableDrivenArm(Robot):
             pieces[..., (2, 4), 2] = self.cap_length
         return pieces
 
-    def configuration_jacobian(self, actuation: ArrayLike) -> FloatArray:
+    def configuration_jacobian(self, actuation: ArrayLike) -> Array:
         """Return d configuration / d actuation, shape (..., 9 or 15, 7)."""
         forces, moments = self._loads(self.check(actuation))
         lengths = self.segment_length - forces / self.axial_stiffness
@@ -163,18 +163,18 @@ class CableDrivenArm(Robot):
         pieces[..., self._soft_pieces, :, :] = soft
         return pieces.reshape(*forces.shape[:-1], -1, 7)
 
-    def mid_point(self, actuation: ArrayLike) -> FloatArray:
+    def mid_point(self, actuation: ArrayLike) -> Array:
         """Return the end of the proximal segment and its cap [m], shape (..., 3): frame {M} of the paper."""
         return chain_transform(self.configuration(actuation)[..., : self._mid_pieces, :])[..., :3, 3]
 
-    def mid_jacobian(self, actuation: ArrayLike) -> FloatArray:
+    def mid_jacobian(self, actuation: ArrayLike) -> Array:
         """Return the Jacobian of {M}, shape (..., 6, 7): the linear rows are J_M of Lai et al., Eq. (27)."""
         count = self._mid_pieces
         pieces = self.configuration(actuation)[..., :count, :]
         return chain_jacobian(pieces) @ self.configuration_jacobian(actuation)[..., : 3 * count, :]
 
     @cached_property
-    def load_slopes(self) -> tuple[FloatArray, FloatArray]:
+    def load_slopes(self) -> tuple[Array, Array]:
         """Axial forces (2, 7) and moment vectors (2, 2, 7) per unit of actuation; rows: proximal, distal.
 
         The sums in Lai et al., Eqs. (1)-(3); the compiled kinematics take them from here.
@@ -186,7 +186,7 @@ class CableDrivenArm(Robot):
         moment = np.stack([own_moment[0] + self.coupling_sign * own_moment[1], own_moment[1]])
         return force, moment
 
-    def _loads(self, actuation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _loads(self, actuation: Array) -> tuple[Array, Array]:
         """Return axial forces (..., 2) [N] and moment vectors (..., 2, 2) [N m] of the two segments."""
         force_slope, moment_slope = self.load_slopes
         return actuation @ force_slope.T, np.tensordot(actuation, moment_slope, axes=(-1, -1))

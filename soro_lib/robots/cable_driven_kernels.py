@@ -9,14 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from soro_lib.arc_kernels import chain_frame_and_jacobian, swing
 from soro_lib.arcs import chain_jacobian, chain_transform
+from soro_lib.checks import Array
 from soro_lib.robots.base import Robot
 from soro_lib.robots.cable_driven import CableDrivenArm
-
-Array = NDArray[np.float64]
 
 
 class Kinematics(NamedTuple):

@@ -12,7 +12,7 @@ from typing import Unpack
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from soro_lib.arc_kernels import (
     arc_numbers,
@@ -26,9 +26,7 @@ from soro_lib.arc_kernels import (
     frame_velocities,
     swing,
 )
-from soro_lib.checks import Bounds, finite
-
-Array = NDArray[np.float64]
+from soro_lib.checks import Array, Bounds, finite
 
 SEGMENTS = 3
 

@@ -5,10 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import check_fields, finite
+from soro_lib.checks import Array, check_fields, finite
 from soro_lib.robots.helix import HelixArm
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

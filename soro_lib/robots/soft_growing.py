@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from soro_lib.checks import check_fields, finite, number
-from soro_lib.robots.base import ActuationError, FloatArray, Robot
+from soro_lib.checks import Array, check_fields, finite, number
+from soro_lib.robots.base import ActuationError, Robot
 
 MOTOR_ANGLES = np.array([-np.pi / 3.0, np.pi / 3.0, np.pi])
 """Directions in the plane that the three steering motors pull toward [rad] (supplement, Eq. (1))."""
@@ -66,21 +66,21 @@ class SoftGrowingArm(Robot):
             )
 
     @cached_property
-    def lower(self) -> FloatArray:
+    def lower(self) -> Array:
         """Lower limits of the tip position [m]."""
         return np.array(self.lower_limit)
 
     @cached_property
-    def upper(self) -> FloatArray:
+    def upper(self) -> Array:
         """Upper limits of the tip position [m]."""
         return np.array(self.upper_limit)
 
     @cached_property
-    def home(self) -> FloatArray:
+    def home(self) -> Array:
         """The tip at the start of a trial: 0.1 m straight below the base (authors' scene)."""
         return np.clip([0.0, 0.0, 0.1], self.lower, self.upper)
 
-    def configuration(self, actuation: ArrayLike) -> FloatArray:
+    def configuration(self, actuation: ArrayLike) -> Array:
         """Return pivot and body, shape (..., 2, 3): an arc of length zero, then a straight piece."""
         tip = self.check(actuation)
         x, y, z = np.moveaxis(tip, -1, 0)
@@ -90,7 +90,7 @@ class SoftGrowingArm(Robot):
         pieces[..., 1, 2] = eversion_length(tip)
         return pieces
 
-    def configuration_jacobian(self, actuation: ArrayLike) -> FloatArray:
+    def configuration_jacobian(self, actuation: ArrayLike) -> Array:
         """Return d configuration / d actuation, shape (..., 6, 3)."""
         tip = self.check(actuation)
         x, y, z = np.moveaxis(tip, -1, 0)
@@ -108,7 +108,7 @@ class SoftGrowingArm(Robot):
         jacobian[..., 1, 2, :] = tip / np.sqrt(square)[..., 0]
         return jacobian.reshape(*tip.shape[:-1], 6, 3)
 
-    def motor_coordinates(self, point: ArrayLike) -> FloatArray:
+    def motor_coordinates(self, point: ArrayLike) -> Array:
         """Return (s1, s2, s3, eversion) [m], shape (..., 4), of a point (..., 3) in the base frame.
 
         Supplement, Eqs. (2)-(5); see `steering_coordinates` and `eversion_length`. Differences of points are
@@ -118,7 +118,7 @@ class SoftGrowingArm(Robot):
         steering = steering_coordinates(position[..., :2])
         return np.concatenate([steering, eversion_length(position)[..., np.newaxis]], axis=-1)
 
-    def point_from_motors(self, motors: ArrayLike) -> FloatArray:
+    def point_from_motors(self, motors: ArrayLike) -> Array:
         """Return the point (..., 3) [m] below the base of (s1, s2, s3, eversion): the inverse map.
 
         Raises
@@ -134,7 +134,7 @@ class SoftGrowingArm(Robot):
         return np.concatenate([steered, np.sqrt(square)[..., np.newaxis]], axis=-1)
 
 
-def steering_coordinates(point: ArrayLike) -> FloatArray:
+def steering_coordinates(point: ArrayLike) -> Array:
     """Return the pulls (s1, s2, s3) [m], shape (..., 3), that reach a point (x, y) [m] of the plane.
 
     Supplement, Eqs. (2)-(4), corrected (Eqs. (3) and (4) halve y, and their sectors overlap or leave a gap).
@@ -146,12 +146,12 @@ def steering_coordinates(point: ArrayLike) -> FloatArray:
     return pulls - pulls.min(axis=-1, keepdims=True)
 
 
-def eversion_length(point: ArrayLike) -> FloatArray:
+def eversion_length(point: ArrayLike) -> Array:
     """Return the body length [m], shape (...), with its tip at a point (..., 3) [m]: supplement, Eq. (5)."""
     return np.sqrt((np.asarray(point, dtype=float) ** 2).sum(axis=-1))
 
 
-def eversion_proxy(actual: ArrayLike, desired: ArrayLike) -> FloatArray:
+def eversion_proxy(actual: ArrayLike, desired: ArrayLike) -> Array:
     """Return the point toward `desired` that needs no eversion from `actual`: supplement, Eqs. (6)-(7).
 
     Parameters
@@ -170,7 +170,7 @@ def eversion_proxy(actual: ArrayLike, desired: ArrayLike) -> FloatArray:
     return np.asarray(desired, dtype=float) * (eversion_length(actual) / length)[..., np.newaxis]
 
 
-def redistribute_actuation(commands: ArrayLike, epsilon: float = REDISTRIBUTION) -> FloatArray:
+def redistribute_actuation(commands: ArrayLike, epsilon: float = REDISTRIBUTION) -> Array:
     """Turn a share of the largest pull into release of all motors: supplement, Eq. (9).
 
     Parameters
@@ -213,6 +213,6 @@ def redistribution_required(previous: ArrayLike, current: ArrayLike) -> bool:
     return not ((before == 0.0) & (after == 0.0)).any()
 
 
-def _tilt_per_radius(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
+def _tilt_per_radius(x: Array, y: Array, z: Array) -> Array:
     radius = np.hypot(x, y)
     return np.divide(np.arctan2(radius, z), radius, out=np.asarray(1.0 / z), where=radius > 0.0)

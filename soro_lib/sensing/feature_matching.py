@@ -10,9 +10,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from soro_lib.checks import Array
 from soro_lib.sensing.camera import Camera
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 

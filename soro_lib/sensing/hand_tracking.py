@@ -18,6 +18,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from soro_lib.checks import Array
+
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 PALM = ("palm_x_mm", "palm_y_mm", "palm_z_mm")
 NORMAL = ("palm_nx", "palm_ny", "palm_nz")
@@ -358,7 +360,7 @@ def _triples(
     table: pd.DataFrame, columns: tuple[str, ...], scale: float = 1.0
 ) -> list[tuple[float, float, float]]:
     """Return three columns as a list of triples; NaN where the table lacks them."""
-    values: NDArray[np.float64] = table.reindex(columns=list(columns)).to_numpy(float) * scale
+    values: Array = table.reindex(columns=list(columns)).to_numpy(float) * scale
     return [tuple(row) for row in values.tolist()]
 
 

@@ -2,10 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from soro_lib.checks import numbers
+from soro_lib.checks import Array, numbers
 from soro_lib.moved import old_names
 
 
@@ -34,9 +31,9 @@ class HandoverObservation:
         If wrist, direction or ball does not have three components.
     """
 
-    wrist: NDArray[np.float64] | None
-    direction: NDArray[np.float64] | None
-    ball: NDArray[np.float64] | None
+    wrist: Array | None
+    direction: Array | None
+    ball: Array | None
     wrist_deviation: float = 0.007
     direction_deviation: float = 0.05
     ball_deviation: float = 0.002

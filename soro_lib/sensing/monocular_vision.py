@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from soro_lib.checks import check_fields, numbers
+from soro_lib.checks import Array, check_fields, numbers
 from soro_lib.sensing.bundle_adjustment import adjust, projection_jacobian
 from soro_lib.sensing.camera import Camera, invert_pose, transform_points
 from soro_lib.sensing.feature_matching import FeatureDetector, Features, match_descriptors, match_near
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 

@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import check_fields, finite
+from soro_lib.checks import Array, check_fields, finite
 from soro_lib.sensing.camera import Camera, Image, invert_pose, transform_points
 
 Region = tuple[slice, slice]
@@ -36,10 +36,10 @@ class Drawable(Protocol):
         """Return the layer; a lower one is drawn first, whatever the distance (floors, backgrounds)."""
 
     @property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> Array:
         """Return the point (3,) [m] in the world whose distance from the camera sets the painting order."""
 
-    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
+    def draw(self, image: Image, camera: Camera, world_in_camera: Array) -> None:
         """Paint into ``image``, in place."""
 
 
@@ -71,7 +71,7 @@ class TexturedQuad:
     :attr:`Camera.reach` is left out.
     """
 
-    corners: NDArray[np.float64]
+    corners: Array
     texture: Image
     layer: int = 0
     supersampling: int = 1
@@ -86,7 +86,7 @@ class TexturedQuad:
         object.__setattr__(self, "corners", corners)
 
     @cached_property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> Array:
         """Return the centre of the quad (3,) [m]."""
         return self.corners.mean(axis=0)
 
@@ -105,7 +105,7 @@ class TexturedQuad:
                 pieces.append(TexturedQuad(corners, texture, self.layer, self.supersampling))
         return pieces
 
-    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
+    def draw(self, image: Image, camera: Camera, world_in_camera: Array) -> None:
         """Paint the quad into ``image``, in place."""
         corners = transform_points(world_in_camera, self.corners)
         right, down = self._edges(corners)
@@ -134,7 +134,7 @@ class TexturedQuad:
         paste(image, region, patch, mask)
 
     @staticmethod
-    def _edges(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _edges(corners: Array) -> tuple[Array, Array]:
         return corners[1] - corners[0], corners[3] - corners[0]
 
 
@@ -152,16 +152,16 @@ class Polygon:
         Painting layer, see :class:`Drawable`.
     """
 
-    corners: NDArray[np.float64]
+    corners: Array
     color: int | tuple[int, int, int]
     layer: int = 0
 
     @cached_property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> Array:
         """Return the mean of the corners (3,) [m]."""
         return np.mean(self.corners, axis=0)
 
-    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
+    def draw(self, image: Image, camera: Camera, world_in_camera: Array) -> None:
         """Paint the polygon into ``image``, in place, with softened edges."""
         outline = camera.clip(transform_points(world_in_camera, self.corners))
         if len(outline) < 3 or (camera.distortion and not camera.sees(outline)):
@@ -293,7 +293,7 @@ def motion_kernel(right: float, down: float) -> NDArray[np.float32]:
     return kernel / kernel.sum()
 
 
-def image_region(pixels: NDArray[np.float64], image: Image) -> Region | None:
+def image_region(pixels: Array, image: Image) -> Region | None:
     """Return the rows and columns of the image that the pixels (n, 2) span, or None if they miss it."""
     (left, top), (right, bottom) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
     rows = slice(max(0, floor(top)), min(image.shape[0], ceil(bottom) + 1))
@@ -321,9 +321,7 @@ def _image(picture: object) -> Image:
     return np.asarray(picture, dtype=np.uint8)
 
 
-def _into_region(
-    homography: NDArray[np.float64], region: Region, supersampling: int
-) -> tuple[NDArray[np.float64], tuple[int, int]]:
+def _into_region(homography: Array, region: Region, supersampling: int) -> tuple[Array, tuple[int, int]]:
     """Return the homography into the supersampled region, and the region's size (width, height) there."""
     rows, columns = region
     centre = 0.5 * (supersampling - 1)
@@ -338,7 +336,7 @@ def _into_region(
     return shift @ homography, size
 
 
-def _polygon_mask(pixels: NDArray[np.float64], region: Region, supersampling: int) -> Image:
+def _polygon_mask(pixels: Array, region: Region, supersampling: int) -> Image:
     """Return a mask of the supersampled region, 255 inside the convex polygon of pixels (n, 2)."""
     shift, (width, height) = _into_region(np.eye(3), region, supersampling)
     inside = np.clip(pixels * shift[0, 0] + shift[:2, 2], -1e6, 1e6)
@@ -347,7 +345,7 @@ def _polygon_mask(pixels: NDArray[np.float64], region: Region, supersampling: in
     return mask
 
 
-def _fixed_point(pixels: NDArray[np.float64]) -> NDArray[np.int32]:
+def _fixed_point(pixels: Array) -> NDArray[np.int32]:
     """Return pixel coordinates with four fractional bits, for OpenCV's drawing functions."""
     return np.round(np.clip(pixels, -1e6, 1e6) * 16).astype(np.int32)
 
@@ -358,7 +356,7 @@ def _white(height: int, width: int) -> Image:
     return np.full((height, width), 255, dtype=np.uint8)
 
 
-def _triple_product(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> float:
+def _triple_product(a: Array, b: Array, c: Array) -> float:
     """Return the determinant of three vectors (3,), on single numbers, which are quicker than arrays."""
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = a.tolist(), b.tolist(), c.tolist()
     return float((ay * bz - az * by) * cx + (az * bx - ax * bz) * cy + (ax * by - ay * bx) * cz)

@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from soro_lib.checks import Array
 from soro_lib.sensing.camera import NEAR, Camera, Image, transform_points
 from soro_lib.worlds.rendering import image_region, paste
 
-Array = NDArray[np.float64]
 Color = tuple[int, int, int]
 """Blue, green, red."""
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import Vector, finite, positive, vector
+from soro_lib.checks import Array, Vector, finite, positive, vector
 from soro_lib.jit import inlined
 
 PHASES = ("start", "grasping", "lifting with item", "placing", "lifting empty", "end")
@@ -99,7 +99,7 @@ def goal_step(rule: GoalRule, state: GoalState, end_effector: Vector, item_held:
 class GoalResult:
     """Current goal (3,), base frame [m], its phase (one of ``PHASES``) and the number of the item."""
 
-    goal: NDArray[np.float64]
+    goal: Array
     phase: str
     item: int
 

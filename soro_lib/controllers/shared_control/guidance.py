@@ -6,10 +6,7 @@ Source: Stroppa et al., Eqs. (2) and (4).
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from soro_lib.checks import Vector, positive
+from soro_lib.checks import Array, Vector, positive
 from soro_lib.jit import inlined
 
 
@@ -81,7 +78,7 @@ class Guidance:
 
     stiffness: float
     magnitude: float
-    force: NDArray[np.float64]
+    force: Array
     state: str
 
 
