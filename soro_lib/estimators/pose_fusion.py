@@ -30,7 +30,8 @@ def fibre_weight(reprojection_error: ArrayLike, lower: float, upper: float) -> A
     ValueError
         If the bounds are not increasing.
     """
-    number("lower", lower, at_least=0, below=number("upper", upper))
+    if not 0.0 <= lower < upper < np.inf:
+        raise ValueError(f"bounds must be 0 <= lower < upper, got lower={lower}, upper={upper}")
     error = np.asarray(reprojection_error, dtype=float)
     error = np.where(np.isnan(error), np.inf, error)
     return np.clip((error - lower) / (upper - lower), 0.0, 1.0)
