@@ -175,11 +175,12 @@ class HelixArm(Robot):
         """
         return self._points(chain_transform(self._segments(q)))
 
-    def tip_points_and_jacobian(self, q: ArrayLike) -> tuple[Array, Array]:
-        """Return `tip_points` X and dX/dq, shape (..., 6, 9), from one pass along the arm.
+    def tip_points_jacobian(self, q: ArrayLike) -> Array:
+        """Return dX/dq, shape (..., 6, 9); its rank is 5, since wrist and gripper keep their distance."""
+        return self.tip_points_and_jacobian(q)[1]
 
-        The rank of dX/dq is 5, since wrist and gripper keep their distance.
-        """
+    def tip_points_and_jacobian(self, q: ArrayLike) -> tuple[Array, Array]:
+        """Return `tip_points` and `tip_points_jacobian` from one pass along the arm."""
         wrist, jacobian = chain_transform_and_jacobian(self._segments(q))
         reach = self.gripper_length * wrist[..., :3, 2]
         swing = np.cross(jacobian[..., 3:, :], reach[..., np.newaxis], axis=-2)

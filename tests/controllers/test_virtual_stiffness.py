@@ -85,7 +85,7 @@ def test_pseudo_inverse_is_the_weighted_least_norm(seed):
     rng = np.random.default_rng(seed)
     q = rng.uniform(ARM.lower, ARM.upper)
     softness = SOFTNESS * 10.0 ** -rng.integers(0, 3, 9)
-    jacobian, error = ARM.tip_points_and_jacobian(q)[1], 0.1 * rng.standard_normal(6)
+    jacobian, error = ARM.tip_points_jacobian(q), 0.1 * rng.standard_normal(6)
     step = weighted_pseudo_inverse(jacobian, softness) @ error
     stretch = unreachable_direction(ARM.tip_points(q))
     np.testing.assert_allclose(jacobian @ step, error - stretch * (stretch @ error), atol=1e-7)
@@ -96,7 +96,7 @@ def test_pseudo_inverse_is_the_weighted_least_norm(seed):
 
 
 def test_steps_of_eqs_17_to_22():
-    jacobian = ARM.tip_points_and_jacobian(BENT)[1]
+    jacobian = ARM.tip_points_jacobian(BENT)
     measured = ARM.tip_points(BENT)
     goal = measured + 0.02 * np.array([1, -1, 0.5, 1, -1, 0.5])
     error = goal - measured
@@ -121,7 +121,7 @@ def algorithm_1(q_sys, q_est, goal, measured, step_size, iterations, early_exit,
     error = target - measured
     result = None
     for _ in range(iterations):
-        change = weighted_pseudo_inverse(ARM.tip_points_and_jacobian(q_est)[1], softness) @ error
+        change = weighted_pseudo_inverse(ARM.tip_points_jacobian(q_est), softness) @ error
         change *= min(1, 0.5 / max(np.abs(change).max(), 1e-300))
         wanted = q_sys + change
         q_sys, softness = limit_state(wanted, softness)
