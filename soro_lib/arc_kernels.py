@@ -6,11 +6,9 @@ Jacobian takes one to two microseconds.
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from soro_lib import arcs
-
-Array = NDArray[np.float64]
+from soro_lib.checks import Array
 
 carry = njit(arcs.carry)
 end_velocities = njit(arcs.end_velocities)

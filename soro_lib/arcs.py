@@ -28,9 +28,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from soro_lib.checks import Array, finite, number
 
 # Below this squared bend the derivatives of S and C are summed as power series: there the closed forms would
 # lose digits to cancellation, above it seven terms would leave more than the rounding error.
@@ -46,8 +46,11 @@ _IDENTITY_ROWS: tuple[tuple[Any, ...], ...] = (
 )
 _LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 
+ARCS = (..., "n >= 0", 3)
+"""Shape of a chain of arcs, or of many: n times (dx, dy, length)."""
 
-def arc_transform(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray:
+
+def arc_transform(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> Array:
     """Return the pose of the end of an arc in the frame of its start.
 
     Parameters
@@ -80,10 +83,17 @@ def arc_transform(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray
     >>> arc_transform(np.pi / 2, 0.0, 0.1)[:3, 3].round(4)
     array([0.0637, 0.    , 0.0637])
     """
-    return chain_transform(_stack_arc(dx, dy, length))
+    named = {"dx": dx, "dy": dy, "length": length}
+    arrays = [finite(name, value) for name, value in named.items()]
+    try:
+        arc = np.stack(np.broadcast_arrays(*arrays), axis=-1)
+    except ValueError:
+        shapes = ", ".join(f"{name} {np.shape(value)}" for name, value in named.items())
+        raise ValueError(f"the shapes of dx, dy and length must broadcast, got {shapes}") from None
+    return chain_transform(arc[..., np.newaxis, :])
 
 
-def chain_transform(configuration: ArrayLike) -> FloatArray:
+def chain_transform(configuration: ArrayLike) -> Array:
     """Return the pose of the end of a chain of arcs in the frame of its start.
 
     Parameters
@@ -111,7 +121,7 @@ def chain_transform(configuration: ArrayLike) -> FloatArray:
     >>> chain_transform([[0.0, 0.0, 0.12], [0.0, 0.0, 0.24]])[:3, 3]
     array([0.  , 0.  , 0.36])
     """
-    arcs = _as_configuration(configuration)
+    arcs = finite("configuration", configuration, ARCS)
     if arcs.ndim == 2:
         rows = _IDENTITY_ROWS
         for arc in _scalar_arcs(arcs):
@@ -123,30 +133,7 @@ def chain_transform(configuration: ArrayLike) -> FloatArray:
     return _pack_transform(frame, arcs.shape[:-2])
 
 
-def arc_jacobian(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return the Jacobian of the end of an arc with respect to (dx, dy, length).
-
-    Parameters
-    ----------
-    dx, dy : array_like, shape (...)
-        Components of the bending angle [rad].
-    length : array_like, shape (...)
-        Arc length [m].
-
-    Returns
-    -------
-    ndarray, shape (..., 6, 3)
-        Rows: linear velocity [m], angular velocity [rad] of the end, both in the frame of the start.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, or the shapes do not broadcast.
-    """
-    return chain_jacobian(_stack_arc(dx, dy, length))
-
-
-def chain_jacobian(configuration: ArrayLike) -> FloatArray:
+def chain_jacobian(configuration: ArrayLike) -> Array:
     """Return the Jacobian of the end of a chain of arcs with respect to all its arc coordinates.
 
     Parameters
@@ -168,15 +155,15 @@ def chain_jacobian(configuration: ArrayLike) -> FloatArray:
     return chain_transform_and_jacobian(configuration)[1]
 
 
-def chain_transform_and_jacobian(configuration: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def chain_transform_and_jacobian(configuration: ArrayLike) -> tuple[Array, Array]:
     """Return :func:`chain_transform` and :func:`chain_jacobian` from one pass along the chain."""
-    arcs = _as_configuration(configuration)
+    arcs = finite("configuration", configuration, ARCS)
     if arcs.ndim == 2:
         return _scalar_transform_and_jacobian(arcs)
     return _batch_transform_and_jacobian(arcs)
 
 
-def backbone(configuration: ArrayLike, points_per_segment: int = 20) -> FloatArray:
+def backbone(configuration: ArrayLike, points_per_segment: int = 20) -> Array:
     """Return points along the chain, for drawing it and for measuring distances to it.
 
     Parameters
@@ -196,9 +183,8 @@ def backbone(configuration: ArrayLike, points_per_segment: int = 20) -> FloatArr
     ValueError
         If the configuration is malformed or `points_per_segment` is below 1.
     """
-    if points_per_segment < 1:
-        raise ValueError(f"points_per_segment must be at least 1, got {points_per_segment}")
-    arcs = _as_configuration(configuration)
+    number("points_per_segment", points_per_segment, at_least=1)
+    arcs = finite("configuration", configuration, ARCS)
     frame = _identity_frame(arcs)
     points = [frame[3][..., np.newaxis]]
     fractions = np.arange(1, points_per_segment + 1) / points_per_segment
@@ -210,7 +196,7 @@ def backbone(configuration: ArrayLike, points_per_segment: int = 20) -> FloatArr
     return np.moveaxis(np.concatenate(points, axis=-1), 0, -1).reshape(*arcs.shape[:-2], -1, 3)
 
 
-def routing_matrix(radius: float, angles: ArrayLike) -> FloatArray:
+def routing_matrix(radius: float, angles: ArrayLike) -> Array:
     """Return the matrix from an arc to the lengths of the tendons or chambers that run along it.
 
     A strand at distance `radius` from the backbone and at angle `angle` about z keeps its place in every
@@ -231,31 +217,6 @@ def routing_matrix(radius: float, angles: ArrayLike) -> FloatArray:
     """
     angles = np.asarray(angles, dtype=float)
     return np.stack([-radius * np.cos(angles), -radius * np.sin(angles), np.ones_like(angles)], axis=-1)
-
-
-def _stack_arc(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray:
-    named = {"dx": dx, "dy": dy, "length": length}
-    for name, value in named.items():
-        if not np.isfinite(np.asarray(value, dtype=float)).all():
-            raise ValueError(f"{name} must be finite, got {value!r}")
-    try:
-        return np.stack(np.broadcast_arrays(dx, dy, length), axis=-1, dtype=float)[..., np.newaxis, :]
-    except ValueError:
-        shapes = ", ".join(f"{name} {np.shape(value)}" for name, value in named.items())
-        raise ValueError(f"the shapes of dx, dy and length must broadcast, got {shapes}") from None
-
-
-def _as_configuration(configuration: ArrayLike) -> FloatArray:
-    try:
-        arcs = np.asarray(configuration, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"configuration must be numbers of shape (..., n, 3): {error}") from None
-    if arcs.ndim < 2 or arcs.shape[-1] != 3:
-        raise ValueError(f"configuration must have shape (..., n, 3) of (dx, dy, length), got {arcs.shape}")
-    if not np.isfinite(arcs).all():
-        where = tuple(int(index) for index in np.argwhere(~np.isfinite(arcs))[0])
-        raise ValueError(f"configuration must be finite, got {arcs[where]} at index {where}")
-    return arcs
 
 
 def carry(row: Sequence[Any], arc: Sequence[Any]) -> tuple[Any, ...]:
@@ -297,7 +258,7 @@ def _cross(a: Any, b: Any) -> tuple[Any, Any, Any]:
 # one arc are also compiled, as they stand, by `soro_lib.arc_kernels` (njit).
 
 
-def _scalar_arcs(arcs: FloatArray) -> list[tuple[float, ...]]:
+def _scalar_arcs(arcs: Array) -> list[tuple[float, ...]]:
     """Return (dx, dy, length, sinc, versinc, cosine) of every arc of one chain, as floats."""
     return [arc_numbers(dx, dy, length) for dx, dy, length in arcs.tolist()]
 
@@ -330,7 +291,7 @@ def arc_slopes(arc: Sequence[float]) -> tuple[float, float]:
     return sinc_slope, versinc_slope
 
 
-def _scalar_transform_and_jacobian(arcs: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _scalar_transform_and_jacobian(arcs: Array) -> tuple[Array, Array]:
     rows = _IDENTITY_ROWS
     ends = []
     for arc in _scalar_arcs(arcs):
@@ -354,24 +315,24 @@ def _scalar_transform_and_jacobian(arcs: FloatArray) -> tuple[FloatArray, FloatA
 # Many chains: every number above becomes an array over the chains, every vector one of shape (3, chains).
 
 
-def _batch_arcs(arcs: FloatArray) -> list[tuple[FloatArray, ...]]:
+def _batch_arcs(arcs: Array) -> list[tuple[Array, ...]]:
     """Return (dx, dy, length, sinc, versinc, cosine) of every arc, each an array over the chains."""
     columns = np.ascontiguousarray(_flat_batch(arcs).T)
     return [_batch_arc(*arc) for arc in columns.transpose(1, 0, 2)]
 
 
-def _flat_batch(arcs: FloatArray) -> FloatArray:
+def _flat_batch(arcs: Array) -> Array:
     return arcs.reshape(math.prod(arcs.shape[:-2]), *arcs.shape[-2:])
 
 
-def _batch_arc(dx: FloatArray, dy: FloatArray, length: FloatArray) -> tuple[FloatArray, ...]:
+def _batch_arc(dx: Array, dy: Array, length: Array) -> tuple[Array, ...]:
     half = 0.5 * np.hypot(dx, dy)
     half_sine = np.sin(half)
     half_sinc = np.divide(half_sine, half, out=np.ones_like(half), where=half > 0.0)
     return dx, dy, length, half_sinc * np.cos(half), 0.5 * half_sinc**2, 1.0 - 2.0 * half_sine**2
 
 
-def _batch_slopes(arc: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+def _batch_slopes(arc: Sequence[Array]) -> tuple[Array, Array]:
     dx, dy, _, sinc, versinc, cosine = arc
     square = dx * dx + dy * dy
     small = square < _SERIES_BOUND
@@ -390,13 +351,13 @@ def _horner(coefficients: Sequence[float], x: Any) -> Any:
     return value
 
 
-def _identity_frame(arcs: FloatArray) -> tuple[FloatArray, ...]:
+def _identity_frame(arcs: Array) -> tuple[Array, ...]:
     """Return the columns of an identity frame, each of shape (3, number of chains)."""
     chains = math.prod(arcs.shape[:-2])
     return tuple(np.broadcast_to(column[:, np.newaxis], (3, chains)) for column in np.eye(4)[:, :3])
 
 
-def _pack_transform(frame: Sequence[FloatArray], batch_shape: tuple[int, ...]) -> FloatArray:
+def _pack_transform(frame: Sequence[Array], batch_shape: tuple[int, ...]) -> Array:
     transform = np.empty((frame[0].shape[1], 4, 4))
     for index, column in enumerate(frame):
         transform[:, :3, index] = column.T
@@ -404,7 +365,7 @@ def _pack_transform(frame: Sequence[FloatArray], batch_shape: tuple[int, ...]) -
     return transform.reshape(*batch_shape, 4, 4)
 
 
-def _batch_transform_and_jacobian(arcs: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _batch_transform_and_jacobian(arcs: Array) -> tuple[Array, Array]:
     batch_shape, count = arcs.shape[:-2], arcs.shape[-2]
     frame = _identity_frame(arcs)
     ends = []

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from soro_lib.checks import Array, check_fields
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
 from soro_lib.estimators.handover_filters import APPENDIX_A, FilterParameters, HandoverFilters
 from soro_lib.estimators.shape_estimation import POSE_WEIGHTS, ShapeEstimate, estimate_shape
@@ -79,11 +80,8 @@ class SafetyRules:
     retreat_share: float = 0.1
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be positive, got {value}")
-        if self.retreat_share > 1:
-            raise ValueError(f"retreat_share must be at most 1, got {self.retreat_share}")
+        check_fields(self, above=0)
+        check_fields(self, "retreat_share", at_most=1)
 
 
 @dataclass(frozen=True)
@@ -129,14 +127,9 @@ class HandoverParameters:
     motors: TendonMotors = field(default_factory=TendonMotors)
 
     def __post_init__(self) -> None:
-        for name in ("pose_bound", "stop_threshold"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        for name in ("pose_bound_share", "bend_softening", "grasp_offset"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise ValueError(f"{name} must be at least 0, got {getattr(self, name)}")
-        if len(self.pose_weights) != 9 or not all(w > 0 for w in self.pose_weights):
-            raise ValueError(f"pose_weights must be nine positive numbers, got {self.pose_weights}")
+        check_fields(self, "pose_bound", "stop_threshold", above=0)
+        check_fields(self, "pose_bound_share", "bend_softening", "grasp_offset", at_least=0)
+        check_fields(self, "pose_weights", shape=(9,), above=0)
 
 
 @dataclass(frozen=True)
@@ -167,21 +160,21 @@ class HandoverCommand:
         Limits met in this step.
     """
 
-    tendon_change: NDArray[np.float64]
+    tendon_change: Array
     gripper_closed: bool
     mode: Mode
     reason: str
     error: float
-    q_sys: NDArray[np.float64]
-    q_est: NDArray[np.float64] | None
-    measured_points: NDArray[np.float64]
-    goal_points: NDArray[np.float64]
-    ball: NDArray[np.float64]
+    q_sys: Array
+    q_est: Array | None
+    measured_points: Array
+    goal_points: Array
+    ball: Array
     estimate_residual: float
     crops: int
 
 
-def goal_over(ball: ArrayLike, height: float, gripper_length: float) -> NDArray[np.float64]:
+def goal_over(ball: ArrayLike, height: float, gripper_length: float) -> Array:
     """Return ``X_goal`` (6,): the gripper upright at a height over the ball, the wrist above it [m] (Section
     3.5).
 
@@ -192,7 +185,7 @@ def goal_over(ball: ArrayLike, height: float, gripper_length: float) -> NDArray[
     return np.concatenate([gripper + gripper_length * UP, gripper])
 
 
-def softened_weights(q_sys: ArrayLike, weights: ArrayLike, softening: float) -> NDArray[np.float64]:
+def softened_weights(q_sys: ArrayLike, weights: ArrayLike, softening: float) -> Array:
     """Return ``A_pose,upd`` (9,) with less weight where gravity has more hold (Vervloet, Section 5.4.3).
 
     A segment's weight falls with its own bend and with the bends of the segments above it [1/rad].
@@ -221,12 +214,12 @@ class HandoverController:
         self.filters = HandoverFilters(self.parameters.filters, self.arm.tip_points(self.arm.home))
         self.mode = Mode.APPROACH
         self.gripper_closed = False
-        self.place: NDArray[np.float64] | None = None
+        self.place: Array | None = None
         self._expected_move = np.zeros(6)
         self._task_mode = Mode.APPROACH
-        self._last_wrist: NDArray[np.float64] | None = None
-        self._last_seen: dict[str, NDArray[np.float64]] = {}
-        self._jumped_to: dict[str, NDArray[np.float64]] = {}
+        self._last_wrist: Array | None = None
+        self._last_seen: dict[str, Array] = {}
+        self._jumped_to: dict[str, Array] = {}
         self._looks_after_jump = {"wrist": 0, "ball": 0}
         self._repeats = 0
         self._ball_unseen = 0
@@ -247,7 +240,7 @@ class HandoverController:
         Whatever is seen, the command stays within the arm's and the motors' limits; see :class:`SafetyRules`.
         """
         if self.mode in (Mode.GRASP, Mode.RELEASE, Mode.STOPPED):
-            return self._command(self.mode, self._retreat_reason)
+            return self._command(self._retreat_reason)
         if self.mode is Mode.RETREAT:
             return self._retreat(self._retreat_reason)
         looked, reason = self._believable(observation)
@@ -275,9 +268,9 @@ class HandoverController:
         self.q_sys = step.q_sys
         self._held = 0
         self.mode = self._task_mode
-        return self._command(self.mode, "", error, estimate, measured, goal, step.crops)
+        return self._command("", error, estimate, measured, goal, step.crops)
 
-    def _estimate(self, measured: NDArray[np.float64]) -> ShapeEstimate:
+    def _estimate(self, measured: Array) -> ShapeEstimate:
         """Return ``q_est`` = SOF(q_sys, X_meas), Eq. (16); or q_sys itself where the optimisation is left
         out."""
         parameters = self.parameters
@@ -290,7 +283,7 @@ class HandoverController:
         bound = parameters.pose_bound + parameters.pose_bound_share * self.filters.points_deviation
         return estimate_shape(self.q_sys, measured, bound, weights, self.arm.gripper_length)
 
-    def _goal(self, measured: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _goal(self, measured: Array) -> Array:
         """Return ``X_goal`` of the stage; the second stage begins when the first goal is reached."""
         length = self.arm.gripper_length
         if self._task_mode is Mode.CARRY and self.place is not None:
@@ -303,11 +296,9 @@ class HandoverController:
             self._enter(Mode.DESCEND)
         return goal_over(ball, 0.0, length)
 
-    def _arrive(
-        self, measured: NDArray[np.float64], goal: NDArray[np.float64], error: float
-    ) -> HandoverCommand:
+    def _arrive(self, measured: Array, goal: Array, error: float) -> HandoverCommand:
         self._enter(Mode.RELEASE if self._task_mode is Mode.CARRY else Mode.GRASP)
-        return self._command(self.mode, "", error, None, measured, goal)
+        return self._command("", error, None, measured, goal)
 
     def _enter(self, mode: Mode) -> None:
         """Begin a stage of the task: the gripper closes to grasp and carry, and opens to release."""
@@ -352,7 +343,7 @@ class HandoverController:
         deviations = (look.wrist_deviation, look.direction_deviation, look.ball_deviation)
         return HandoverObservation(wrist, direction, ball, *deviations), reason
 
-    def _without_jump(self, name: str, point: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    def _without_jump(self, name: str, point: Array | None) -> Array | None:
         """Return the point, or None if it jumped and has not stayed where it jumped to."""
         if point is None:
             return None
@@ -384,7 +375,7 @@ class HandoverController:
         if self._held > self.parameters.safety.hold_limit:
             return self._retreat(f"held for {self.parameters.safety.hold_limit} steps: {reason}")
         self.mode = Mode.HOLD
-        return self._command(Mode.HOLD, reason)
+        return self._command(reason)
 
     def _retreat(self, reason: str) -> HandoverCommand:
         """Go home open loop: a straight way within the limits, which are convex in `q_sys`, with an open
@@ -396,16 +387,15 @@ class HandoverController:
         if np.abs(self.q_sys - self.arm.home).max() < 0.01:
             self.q_sys = self.arm.home.copy()
             self.mode = Mode.STOPPED
-        return self._command(self.mode, reason)
+        return self._command(reason)
 
     def _command(
         self,
-        mode: Mode,
         reason: str,
         error: float = np.nan,
         estimate: ShapeEstimate | None = None,
-        measured: NDArray[np.float64] | None = None,
-        goal: NDArray[np.float64] | None = None,
+        measured: Array | None = None,
+        goal: Array | None = None,
         crops: int = 0,
     ) -> HandoverCommand:
         change = self.arm.tendon_lengths(self.q_sys) - self._calibrated_tendons
@@ -414,7 +404,7 @@ class HandoverController:
         return HandoverCommand(
             tendon_change=clipped,
             gripper_closed=self.gripper_closed,
-            mode=mode,
+            mode=self.mode,
             reason=reason,
             error=error,
             q_sys=self.q_sys.copy(),
@@ -427,7 +417,7 @@ class HandoverController:
         )
 
 
-def finite(vector: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+def finite(vector: Array | None) -> Array | None:
     """Return the vector, or None if it is missing or not finite."""
     if vector is None or not np.isfinite(vector).all():
         return None

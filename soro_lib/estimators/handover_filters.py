@@ -7,8 +7,8 @@ adds a share of the movement that the controller has just commanded and grows it
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soro_lib.checks import Array, check_fields
 from soro_lib.poses import magnitude
 from soro_lib.sensing.handover_observation import HandoverObservation
 
@@ -38,14 +38,10 @@ class FilterNoise:
     move_deviation: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("process", "initial"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        if self.measurement is not None and not self.measurement > 0:
-            raise ValueError(f"measurement must be positive, got {self.measurement}")
-        for name in ("expected_move", "move_deviation"):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"{name} must be at least 0, got {getattr(self, name)}")
+        check_fields(self, "process", "initial", above=0)
+        if self.measurement is not None:
+            check_fields(self, "measurement", above=0)
+        check_fields(self, "expected_move", "move_deviation", at_least=0)
 
 
 @dataclass(frozen=True)
@@ -90,18 +86,18 @@ class PointFilter:
     three components. Equal to filterpy's filter with those matrices (tested).
     """
 
-    def __init__(self, noise: FilterNoise, start: NDArray[np.float64]) -> None:
+    def __init__(self, noise: FilterNoise, start: Array) -> None:
         self.noise = noise
         self.state = np.array(start, dtype=float)
         self.variance = noise.initial
 
-    def predict(self, move: NDArray[np.float64]) -> None:
+    def predict(self, move: Array) -> None:
         """Expect the point to make a share of the commanded movement (3,): Eq. (14)."""
         noise = self.noise
         self.state = self.state + noise.expected_move * move
         self.variance += noise.process + noise.move_deviation**2 * magnitude(move) ** 2
 
-    def update(self, measured: NDArray[np.float64], claimed_deviation: float) -> None:
+    def update(self, measured: Array, claimed_deviation: float) -> None:
         """Weigh in a measured point (3,): Eq. (15)."""
         variance = self.noise.measurement
         if variance is None:
@@ -122,7 +118,7 @@ class HandoverFilters:
         Wrist and gripper of the calibrated arm [m], the state before the first look.
     """
 
-    def __init__(self, parameters: FilterParameters, start_points: NDArray[np.float64]) -> None:
+    def __init__(self, parameters: FilterParameters, start_points: Array) -> None:
         wrist, gripper = np.asarray(start_points, dtype=float).reshape(2, 3)
         self.gripper_length = magnitude(gripper - wrist)
         self.ball = PointFilter(parameters.ball, gripper)
@@ -130,7 +126,7 @@ class HandoverFilters:
         self.direction = PointFilter(parameters.direction, (gripper - wrist) / self.gripper_length)
         self.ball_seen = False
 
-    def predict(self, points_move: NDArray[np.float64]) -> None:
+    def predict(self, points_move: Array) -> None:
         """Predict all three, given the commanded movement of wrist and gripper (6,) [m]."""
         self.ball.predict(np.zeros(3))
         self.wrist.predict(points_move[:3])
@@ -146,7 +142,7 @@ class HandoverFilters:
             self.ball_seen = True
 
     @property
-    def points(self) -> NDArray[np.float64]:
+    def points(self) -> Array:
         """``X_meas``: filtered wrist and gripper (6,) [m], a gripper length apart (Vervloet, Eqs. (12)-(13)).
 
         The filtered direction is normalised, without which X_meas would leave the reachable set (Erratum
@@ -161,9 +157,7 @@ class HandoverFilters:
         return float(np.sqrt(6 * self.wrist.variance + 3 * leverage))
 
 
-def points_from_direction(
-    wrist: NDArray[np.float64], direction: NDArray[np.float64], gripper_length: float
-) -> NDArray[np.float64]:
+def points_from_direction(wrist: Array, direction: Array, gripper_length: float) -> Array:
     """Return wrist and gripper (6,) [m] from the wrist (3,) and a direction (3,) of any length (Eqs.
     (12)-(13))."""
     return np.concatenate([wrist, wrist + gripper_length * direction / magnitude(direction)])

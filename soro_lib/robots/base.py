@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.arcs import backbone, chain_jacobian, chain_transform
-
-FloatArray = NDArray[np.float64]
+from soro_lib.checks import Array, finite, numbers
 
 LIMIT_TOLERANCE = 1e-9
 """Share of an actuator's range by which rounding may exceed a limit."""
@@ -43,9 +42,9 @@ class ClippedActuation:
         Requested minus admissible value, in the unit of the actuator.
     """
 
-    actuation: FloatArray
+    actuation: Array
     clipped: NDArray[np.bool_]
-    excess: FloatArray
+    excess: Array
 
     @property
     def any_clipped(self) -> bool:
@@ -64,29 +63,29 @@ class Robot(Protocol):
     actuator_names: tuple[str, ...]
 
     @property
-    def lower(self) -> FloatArray:
+    def lower(self) -> Array:
         """Lower actuator limits, shape (n,)."""
         ...
 
     @property
-    def upper(self) -> FloatArray:
+    def upper(self) -> Array:
         """Upper actuator limits, shape (n,)."""
         ...
 
     @property
-    def home(self) -> FloatArray:
+    def home(self) -> Array:
         """Actuation at rest, shape (n,)."""
         ...
 
-    def configuration(self, actuation: ArrayLike) -> FloatArray:
+    def configuration(self, actuation: ArrayLike) -> Array:
         """Return the pieces of the arm from base to tip, shape (..., m, 3) of (dx, dy, length)."""
         ...
 
-    def configuration_jacobian(self, actuation: ArrayLike) -> FloatArray:
+    def configuration_jacobian(self, actuation: ArrayLike) -> Array:
         """Return the derivative of the flattened configuration, shape (..., 3 m, n)."""
         ...
 
-    def forward(self, actuation: ArrayLike) -> FloatArray:
+    def forward(self, actuation: ArrayLike) -> Array:
         """Return the tip pose in the base frame, shape (..., 4, 4).
 
         Raises
@@ -96,7 +95,7 @@ class Robot(Protocol):
         """
         return chain_transform(self.configuration(actuation))
 
-    def jacobian(self, actuation: ArrayLike) -> FloatArray:
+    def jacobian(self, actuation: ArrayLike) -> Array:
         """Return the tip Jacobian, shape (..., 6, n): linear, then angular velocity in the base frame.
 
         Raises
@@ -106,101 +105,49 @@ class Robot(Protocol):
         """
         return chain_jacobian(self.configuration(actuation)) @ self.configuration_jacobian(actuation)
 
-    def tip(self, actuation: ArrayLike) -> FloatArray:
+    def tip(self, actuation: ArrayLike) -> Array:
         """Return the tip position in the base frame [m], shape (..., 3)."""
         return self.forward(actuation)[..., :3, 3]
 
-    def backbone(self, actuation: ArrayLike, points_per_segment: int = 20) -> FloatArray:
+    def backbone(self, actuation: ArrayLike, points_per_segment: int = 20) -> Array:
         """Return points [m] along the arm in the base frame, shape (..., k, 3); see `arcs.backbone`."""
         return backbone(self.configuration(actuation), points_per_segment)
 
-    def check(self, actuation: ArrayLike) -> FloatArray:
-        """Return the actuation as an array, shape (..., n), or raise :class:`ActuationError`."""
-        return check_actuation(actuation, self.lower, self.upper, self.actuator_names)
+    def check(self, actuation: ArrayLike) -> Array:
+        """Return the actuation as an array, shape (..., n), if it lies within the limits.
+
+        Both limits are admissible; rounding may exceed them by `LIMIT_TOLERANCE` of the range.
+
+        Raises
+        ------
+        ActuationError
+            Naming the actuator, its index, the value and the bound.
+        """
+        lower, upper, names = self.lower, self.upper, self.actuator_names
+        array = numbers("actuation", actuation, (..., len(names)), ActuationError)
+        slack = LIMIT_TOLERANCE * (upper - lower)
+        within = (array >= lower - slack) & (array <= upper + slack)
+        if not within.all():
+            index = tuple(np.argwhere(~within)[0])
+            actuator = int(index[-1])
+            raise ActuationError(
+                f"actuation[{actuator}] ({names[actuator]}) is {array[index]:.6g}, "
+                f"outside [{lower[actuator]:.6g}, {upper[actuator]:.6g}]"
+            )
+        return array
 
     def clip(self, actuation: ArrayLike) -> ClippedActuation:
-        """Return the nearest admissible actuation and the report of what was changed."""
-        return clip_actuation(actuation, self.lower, self.upper, self.actuator_names)
+        """Return the nearest admissible actuation, actuator by actuator, and the report of what was changed.
+
+        Raises
+        ------
+        ActuationError
+            If the actuation is malformed or not finite: there is no nearest value then.
+        """
+        requested = finite("actuation", actuation, (..., len(self.actuator_names)), ActuationError)
+        return report_clipping(requested, np.clip(requested, self.lower, self.upper))
 
 
-def check_actuation(
-    actuation: ArrayLike, lower: FloatArray, upper: FloatArray, names: tuple[str, ...]
-) -> FloatArray:
-    """Return the actuation as an array if it lies within the limits.
-
-    Parameters
-    ----------
-    actuation : array_like, shape (..., n)
-        Commands, one per actuator.
-    lower, upper : ndarray, shape (n,)
-        Limits, both admissible; rounding may exceed them by `LIMIT_TOLERANCE` of the range.
-    names : tuple of str
-        What the actuators are called in the error, with unit.
-
-    Raises
-    ------
-    ActuationError
-        Naming the actuator, its index, the value and the bound.
-    """
-    array = _as_actuation(actuation, names)
-    slack = LIMIT_TOLERANCE * (upper - lower)
-    within = (array >= lower - slack) & (array <= upper + slack)
-    if not within.all():
-        index = tuple(np.argwhere(~within)[0])
-        actuator = int(index[-1])
-        raise ActuationError(
-            f"actuation[{actuator}] ({names[actuator]}) is {array[index]:.6g}, "
-            f"outside [{lower[actuator]:.6g}, {upper[actuator]:.6g}]"
-        )
-    return array
-
-
-def clip_actuation(
-    actuation: ArrayLike, lower: FloatArray, upper: FloatArray, names: tuple[str, ...]
-) -> ClippedActuation:
-    """Move an actuation into the limits, actuator by actuator, and report what was changed.
-
-    Raises
-    ------
-    ActuationError
-        If the actuation is malformed or not finite: there is no nearest value then.
-    """
-    array = finite_actuation(actuation, names)
-    return report_clipping(array, np.clip(array, lower, upper))
-
-
-def finite_actuation(actuation: ArrayLike, names: tuple[str, ...]) -> FloatArray:
-    """Return the actuation as an array, shape (..., n), or raise `ActuationError` where it is not finite."""
-    return require_finite(_as_actuation(actuation, names), "actuation")
-
-
-def report_clipping(requested: FloatArray, admissible: FloatArray) -> ClippedActuation:
+def report_clipping(requested: Array, admissible: Array) -> ClippedActuation:
     """Return the admissible actuation and the report of how it differs from the requested one."""
     return ClippedActuation(admissible, admissible != requested, requested - admissible)
-
-
-def require_finite(array: FloatArray, name: str) -> FloatArray:
-    """Return the array, or raise :class:`ActuationError` naming its first value that is not finite."""
-    if not np.isfinite(array).all():
-        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ActuationError(f"{name} must be finite, got {array[index]} at index {index}")
-    return array
-
-
-def require_positive(**values: float) -> None:
-    """Raise ValueError naming the first parameter that is not a finite positive number."""
-    for name, value in values.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} must be finite and positive, got {value!r}")
-
-
-def _as_actuation(actuation: ArrayLike, names: tuple[str, ...]) -> FloatArray:
-    try:
-        array = np.asarray(actuation, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ActuationError(f"actuation must be numbers of shape (..., {len(names)}): {error}") from None
-    if array.ndim == 0 or array.shape[-1] != len(names):
-        raise ActuationError(
-            f"actuation must have shape (..., {len(names)}) of ({', '.join(names)}), got {array.shape}"
-        )
-    return array

@@ -13,18 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from soro_lib.arcs import chain_transform, chain_transform_and_jacobian, routing_matrix
+from soro_lib.checks import Array, check_fields, finite, number
 from soro_lib.robots.base import (
     LIMIT_TOLERANCE,
     ActuationError,
     ActuationWarning,
     ClippedActuation,
-    FloatArray,
     Robot,
-    check_actuation,
-    finite_actuation,
     report_clipping,
-    require_finite,
-    require_positive,
 )
 
 TENDON_ANGLES = 2.0 * np.pi / 3.0 * np.arange(3)
@@ -94,43 +90,31 @@ class HelixArm(Robot):
     )
 
     def __post_init__(self) -> None:
-        require_positive(
-            tendon_radius=self.tendon_radius,
-            pulley_radius=self.pulley_radius,
-            gripper_length=self.gripper_length,
-        )
-        triples = ("rest_lengths", "maximum_bends", "minimum_lengths", "maximum_lengths", "tendon_offsets")
-        for name in triples:
-            values = np.asarray(getattr(self, name), dtype=float)
-            if values.shape != (3,) or not np.isfinite(values).all():
-                raise ValueError(f"{name} must be three finite numbers, got {getattr(self, name)!r}")
-        for i in range(3):
-            require_positive(**{f"maximum_bends[{i}]": self.maximum_bends[i]})
-            require_positive(**{f"minimum_lengths[{i}]": self.minimum_lengths[i]})
-            if not self.minimum_lengths[i] <= self.rest_lengths[i] <= self.maximum_lengths[i]:
-                raise ValueError(
-                    f"rest_lengths[{i}] must be in [{self.minimum_lengths[i]}, {self.maximum_lengths[i]}], "
-                    f"got {self.rest_lengths[i]!r}"
-                )
+        check_fields(self, "tendon_radius", "pulley_radius", "gripper_length", above=0)
+        check_fields(self, "maximum_bends", "minimum_lengths", shape=(3,), above=0)
+        check_fields(self, "rest_lengths", "maximum_lengths", "tendon_offsets", shape=(3,))
+        bounds = zip(self.minimum_lengths, self.rest_lengths, self.maximum_lengths)
+        for i, (low, rest, high) in enumerate(bounds):
+            number(f"HelixArm.rest_lengths[{i}]", rest, at_least=low, at_most=high)
         if len(self.motor_orientations) != 9 or not set(self.motor_orientations) <= {-1, 1}:
             raise ValueError(f"motor_orientations must be nine of -1 and +1, got {self.motor_orientations!r}")
 
     @cached_property
-    def lower(self) -> FloatArray:
+    def lower(self) -> Array:
         """Lower limits of q; each bend is limited by its magnitude too, see `bends_and_lengths`."""
         return _as_state(-np.asarray(self.maximum_bends), self.minimum_lengths)
 
     @cached_property
-    def upper(self) -> FloatArray:
+    def upper(self) -> Array:
         """Upper limits of q; each bend is limited by its magnitude too, see `bends_and_lengths`."""
         return _as_state(self.maximum_bends, self.maximum_lengths)
 
     @cached_property
-    def home(self) -> FloatArray:
+    def home(self) -> Array:
         """The calibrated state: straight, at rest length (Vervloet, X_0 of Section 3.1)."""
         return _as_state(np.zeros(3), self.rest_lengths)
 
-    def check(self, actuation: ArrayLike) -> FloatArray:
+    def check(self, actuation: ArrayLike) -> Array:
         """Return q as an array: Vervloet, Eqs. (10)-(11).
 
         Raises
@@ -143,7 +127,7 @@ class HelixArm(Robot):
         ActuationWarning
             If the bend hypot(dx, dy) of a segment exceeds its limit although dx and dy respect theirs.
         """
-        q = check_actuation(actuation, self.lower, self.upper, self.actuator_names)
+        q = super().check(actuation)
         bends = self.bends_and_lengths(q)[..., ::2]
         too_far = bends > np.asarray(self.maximum_bends) * (1.0 + LIMIT_TOLERANCE)
         if too_far.any():
@@ -159,7 +143,7 @@ class HelixArm(Robot):
 
     def clip(self, actuation: ArrayLike) -> ClippedActuation:
         """Return the nearest q within the limits, bends shrunk in their own plane, and the report."""
-        q = finite_actuation(actuation, self.actuator_names)
+        q = finite("actuation", actuation, (..., 9), ActuationError)
         bends = self.bends_and_lengths(q)[..., ::2]
         maximum = np.asarray(self.maximum_bends)
         shrink = np.divide(maximum, bends, out=np.ones_like(bends), where=bends > maximum)
@@ -168,22 +152,22 @@ class HelixArm(Robot):
         clipped[..., 2] = np.clip(clipped[..., 2], self.minimum_lengths, self.maximum_lengths)
         return report_clipping(q, clipped.reshape(q.shape))
 
-    def configuration(self, actuation: ArrayLike) -> FloatArray:
+    def configuration(self, actuation: ArrayLike) -> Array:
         """Return the three segments of q, shape (..., 3, 3) of (dx, dy, length): Vervloet, Eq. (7)."""
         q = self.check(actuation)
         return q.reshape(*q.shape[:-1], 3, 3)
 
-    def configuration_jacobian(self, actuation: ArrayLike) -> FloatArray:
+    def configuration_jacobian(self, actuation: ArrayLike) -> Array:
         """Return the identity, shape (..., 9, 9): the actuation is the configuration."""
         return np.broadcast_to(np.eye(9), (*self.check(actuation).shape[:-1], 9, 9))
 
-    def bends_and_lengths(self, q: ArrayLike) -> FloatArray:
+    def bends_and_lengths(self, q: ArrayLike) -> Array:
         """Return (d1, l1, d2, l2, d3, l3), shape (..., 6), with d = hypot(dx, dy): Vervloet, Eqs. (8)-(9)."""
         segments = self._segments(q)
         pairs = np.stack([np.hypot(segments[..., 0], segments[..., 1]), segments[..., 2]], axis=-1)
         return pairs.reshape(*pairs.shape[:-2], 6)
 
-    def tip_points(self, q: ArrayLike) -> FloatArray:
+    def tip_points(self, q: ArrayLike) -> Array:
         """Return the wrist and the gripper point, shape (..., 6) [m]: the pose vector X of Vervloet.
 
         Any finite state is accepted, also one outside the limits: estimates of the state (Section 3.4) are
@@ -191,11 +175,11 @@ class HelixArm(Robot):
         """
         return self._points(chain_transform(self._segments(q)))
 
-    def tip_points_jacobian(self, q: ArrayLike) -> FloatArray:
+    def tip_points_jacobian(self, q: ArrayLike) -> Array:
         """Return dX/dq, shape (..., 6, 9); its rank is 5, since wrist and gripper keep their distance."""
         return self.tip_points_and_jacobian(q)[1]
 
-    def tip_points_and_jacobian(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def tip_points_and_jacobian(self, q: ArrayLike) -> tuple[Array, Array]:
         """Return `tip_points` and `tip_points_jacobian` from one pass along the arm."""
         wrist, jacobian = chain_transform_and_jacobian(self._segments(q))
         reach = self.gripper_length * wrist[..., :3, 2]
@@ -203,7 +187,7 @@ class HelixArm(Robot):
         rows = np.concatenate([jacobian[..., :3, :], jacobian[..., :3, :] + swing], axis=-2)
         return self._points(wrist), rows
 
-    def tendon_lengths(self, q: ArrayLike) -> FloatArray:
+    def tendon_lengths(self, q: ArrayLike) -> Array:
         """Return the nine tendon lengths g(q) [m], shape (..., 9), three per segment from base to tip.
 
         The thesis calls g nonlinear and does not print it; for tendons that keep their place in every
@@ -212,52 +196,50 @@ class HelixArm(Robot):
         lengths = np.einsum("ijk,...ik->...ij", self._routing, self._segments(q))
         return lengths.reshape(*lengths.shape[:-2], 9)
 
-    def state_from_tendons(self, lengths: ArrayLike) -> FloatArray:
+    def state_from_tendons(self, lengths: ArrayLike) -> Array:
         """Return the state q, shape (..., 9), of nine tendon lengths [m]: the inverse of `tendon_lengths`."""
         strands = self._segments(lengths, "lengths")
         segments = np.einsum("ijk,...ik->...ij", self._inverse_routing, strands)
         return segments.reshape(*segments.shape[:-2], 9)
 
-    def motor_angles(self, lengths: ArrayLike) -> FloatArray:
+    def motor_angles(self, lengths: ArrayLike) -> Array:
         """Return the motor angles [rad] from calibration, shape (..., 9), of nine tendon lengths [m]."""
-        strands = require_finite(np.asarray(lengths, dtype=float), "lengths")
+        strands = finite("lengths", lengths, (..., 9), ActuationError)
         change = strands - self.tendon_lengths(self.home)
         return np.asarray(self.motor_orientations) * change / self.pulley_radius
 
-    def tendons_from_motors(self, angles: ArrayLike) -> FloatArray:
+    def tendons_from_motors(self, angles: ArrayLike) -> Array:
         """Return the tendon lengths [m], shape (..., 9), of nine motor angles [rad] from calibration."""
-        turned = require_finite(np.asarray(angles, dtype=float), "angles")
+        turned = finite("angles", angles, (..., 9), ActuationError)
         return (
             self.tendon_lengths(self.home) + np.asarray(self.motor_orientations) * turned * self.pulley_radius
         )
 
-    def _points(self, wrist: FloatArray) -> FloatArray:
+    def _points(self, wrist: Array) -> Array:
         position, pointing = wrist[..., :3, 3], wrist[..., :3, 2]
         return np.concatenate([position, position + self.gripper_length * pointing], axis=-1)
 
     @cached_property
-    def _inverse_routing(self) -> FloatArray:
+    def _inverse_routing(self) -> Array:
         """Inverses (3, 3, 3) of the routing, by cofactors: the same bits on every processor."""
         a, b, c = np.moveaxis(self._routing, -1, 0)
         rows = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
         return rows / np.sum(a * rows[..., 0, :], axis=-1)[..., None, None]
 
     @cached_property
-    def _routing(self) -> FloatArray:
+    def _routing(self) -> Array:
         return np.stack([routing_matrix(self.tendon_radius, TENDON_ANGLES + b) for b in self.tendon_offsets])
 
     @staticmethod
-    def _segments(values: ArrayLike, name: str = "q") -> FloatArray:
-        array = np.asarray(values, dtype=float)
-        if array.ndim == 0 or array.shape[-1] != 9:
-            raise ActuationError(f"{name} must have shape (..., 9), got {array.shape}")
-        return require_finite(array, name).reshape(*array.shape[:-1], 3, 3)
+    def _segments(values: ArrayLike, name: str = "q") -> Array:
+        array = finite(name, values, (..., 9), ActuationError)
+        return array.reshape(*array.shape[:-1], 3, 3)
 
 
-def origin_from_arm_base(points: ArrayLike) -> FloatArray:
+def origin_from_arm_base(points: ArrayLike) -> Array:
     """Return points or directions, shape (..., 3), of arm_base (z down) in origin (z up); its own inverse."""
     return np.asarray(points, dtype=float) @ ORIGIN_FROM_ARM_BASE
 
 
-def _as_state(bends: ArrayLike, lengths: ArrayLike) -> FloatArray:
+def _as_state(bends: ArrayLike, lengths: ArrayLike) -> Array:
     return np.stack([bends, bends, lengths], axis=-1).ravel().astype(float)

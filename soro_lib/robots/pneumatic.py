@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from soro_lib.arcs import routing_matrix
-from soro_lib.robots.base import FloatArray, Robot, require_finite, require_positive
+from soro_lib.checks import Array, check_fields, finite
+from soro_lib.robots.base import ActuationError, Robot
 
 CHAMBER_ANGLES = np.pi / 2.0 + 2.0 * np.pi / 3.0 * np.arange(3)
 """Directions of the three chambers about z [rad]: 90, 210 and 330 degrees, as Eqs. (19)-(22) imply."""
@@ -58,35 +59,29 @@ class PneumaticArm(Robot):
     )
 
     def __post_init__(self) -> None:
-        require_positive(chamber_distance=self.chamber_distance, minimum_length=self.minimum_length)
-        if not self.minimum_length <= self.rest_length <= self.maximum_length < np.inf:
-            raise ValueError(
-                f"minimum_length <= rest_length <= maximum_length must hold, got {self.minimum_length!r}, "
-                f"{self.rest_length!r}, {self.maximum_length!r}"
-            )
-        if len(self.motor_gains) != 3 or not all(
-            np.isfinite(gain) and gain != 0 for gain in self.motor_gains
-        ):
-            raise ValueError(
-                f"motor_gains must be three finite numbers other than 0, got {self.motor_gains!r}"
-            )
+        check_fields(self, "chamber_distance", "minimum_length", above=0)
+        check_fields(self, "maximum_length", at_least=self.minimum_length)
+        check_fields(self, "rest_length", at_least=self.minimum_length, at_most=self.maximum_length)
+        check_fields(self, "motor_gains", shape=(3,))
+        if 0 in self.motor_gains:
+            raise ValueError(f"motor_gains must be other than 0, got {self.motor_gains!r}")
 
     @cached_property
-    def lower(self) -> FloatArray:
+    def lower(self) -> Array:
         """Lower limits of the chamber lengths [m]."""
         return np.full(3, self.minimum_length)
 
     @cached_property
-    def upper(self) -> FloatArray:
+    def upper(self) -> Array:
         """Upper limits of the chamber lengths [m]."""
         return np.full(3, self.maximum_length)
 
     @cached_property
-    def home(self) -> FloatArray:
+    def home(self) -> Array:
         """The three chamber lengths at rest [m]."""
         return np.full(3, self.rest_length)
 
-    def configuration(self, actuation: ArrayLike) -> FloatArray:
+    def configuration(self, actuation: ArrayLike) -> Array:
         """Return the arc of the chamber lengths, shape (..., 1, 3) of (dx, dy, length).
 
         Wang et al., Eqs. (19)-(21), without their singularity and folded arctangent: with
@@ -98,26 +93,23 @@ class PneumaticArm(Robot):
         dy = bend * (0.5 * (second + third) - first)
         return np.stack([dx, dy, (first + second + third) / 3.0], axis=-1)[..., np.newaxis, :]
 
-    def configuration_jacobian(self, actuation: ArrayLike) -> FloatArray:
+    def configuration_jacobian(self, actuation: ArrayLike) -> Array:
         """Return d configuration / d actuation, shape (..., 3, 3): the same everywhere."""
         batch_shape = self.check(actuation).shape[:-1]
         bend, root = 2.0 / (3.0 * self.chamber_distance), np.sqrt(0.75)
         slopes = [[0.0, bend * root, -bend * root], [-bend, 0.5 * bend, 0.5 * bend], [1.0 / 3.0] * 3]
         return np.broadcast_to(slopes, (*batch_shape, 3, 3))
 
-    def displacement(self, actuation: ArrayLike) -> FloatArray:
+    def displacement(self, actuation: ArrayLike) -> Array:
         """Return the tip position relative to the tip at rest [m], shape (..., 3), as in Section II-A."""
         return self.tip(actuation) - np.array([0.0, 0.0, self.rest_length])
 
-    def chamber_lengths(self, configuration: ArrayLike) -> FloatArray:
+    def chamber_lengths(self, configuration: ArrayLike) -> Array:
         """Return the chamber lengths [m], shape (..., 3), of one arc, shape (..., 1, 3): the inverse map."""
-        arcs = np.asarray(configuration, dtype=float)
-        if arcs.shape[-2:] != (1, 3):
-            raise ValueError(f"configuration must have shape (..., 1, 3), got {arcs.shape}")
-        routing = routing_matrix(self.chamber_distance, CHAMBER_ANGLES)
-        lengths: FloatArray = require_finite(arcs[..., 0, :], "configuration") @ routing.T
+        arcs = finite("configuration", configuration, (..., 1, 3), ActuationError)
+        lengths: Array = arcs[..., 0, :] @ routing_matrix(self.chamber_distance, CHAMBER_ANGLES).T
         return lengths
 
-    def motor_commands(self, actuation: ArrayLike) -> FloatArray:
+    def motor_commands(self, actuation: ArrayLike) -> Array:
         """Return the motor commands ``alpha (lengths - rest)``, shape (..., 3): Wang et al., Eq. (27)."""
         return np.asarray(self.motor_gains) * (self.check(actuation) - self.home)

@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from soro_lib.checks import Array
+
 Indices = NDArray[np.intp]
 
 

@@ -12,6 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import Array, check_fields, one_of
+
 NEAR = 1e-3
 """Distance of the near plane [m]: whatever is closer to the camera, or behind it, is cut off."""
 
@@ -47,24 +49,21 @@ class Camera:
     distortion: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("width", "height", "focal_length"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"Camera.{name} must be positive, got {getattr(self, name)}")
-        if len(self.distortion) not in (0, 4, 5):
-            raise ValueError(f"Camera.distortion must have 0, 4 or 5 entries, got {len(self.distortion)}")
+        check_fields(self, "width", "height", "focal_length", above=0)
+        one_of("number of coefficients in Camera.distortion", len(self.distortion), (0, 4, 5))
 
     @cached_property
-    def matrix(self) -> NDArray[np.float64]:
+    def matrix(self) -> Array:
         """Return the (3, 3) matrix of intrinsic parameters."""
         centre = self.principal_point or ((self.width - 1) / 2, (self.height - 1) / 2)
         return np.array([[self.focal_length, 0, centre[0]], [0, self.focal_length, centre[1]], [0, 0, 1.0]])
 
     @cached_property
-    def coefficients(self) -> NDArray[np.float64]:
+    def coefficients(self) -> Array:
         """Return the distortion coefficients as OpenCV wants them, (n,)."""
         return np.array(self.distortion or (0.0, 0.0, 0.0, 0.0))
 
-    def project(self, points: ArrayLike) -> NDArray[np.float64]:
+    def project(self, points: ArrayLike) -> Array:
         """Return the pixels (n, 2) of points (n, 3) [m] in the camera frame, in front of it."""
         points = np.asarray(points, dtype=float).reshape(-1, 3)
         if self.distortion:
@@ -74,7 +73,7 @@ class Camera:
         homogeneous = points @ self.matrix.T
         return homogeneous[:, :2] / homogeneous[:, 2:]
 
-    def rays(self, pixels: ArrayLike) -> NDArray[np.float64]:
+    def rays(self, pixels: ArrayLike) -> Array:
         """Return the viewing directions (n, 3), with z = 1 and the distortion removed, of pixels (n, 2)."""
         pixels = np.asarray(pixels, dtype=float).reshape(-1, 2)
         if self.distortion:
@@ -100,7 +99,7 @@ class Camera:
         turns = roots.real[(abs(roots.imag) < 1e-12) & (roots.real > 0)]
         return float(np.sqrt(turns.min(initial=np.inf)))
 
-    def clip(self, polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    def clip(self, polygon: Array) -> Array:
         """Return the part (m, 3) of a convex polygon (n, 3) in front of the camera and near its view.
 
         The view is widened by a whole image on every side, which leaves room for the distortion.
@@ -113,7 +112,7 @@ class Camera:
         return polygon
 
     @cached_property
-    def _view(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _view(self) -> tuple[Array, Array]:
         """Return normals (5, 3) and offsets (5,) [m] of the half spaces of :meth:`clip`."""
         (f, _, cx), (_, _, cy) = self.matrix[:2]
         left, top = cx + self.width, cy + self.height
@@ -121,18 +120,18 @@ class Camera:
         normals = [(0, 0, 1), (f, 0, left), (-f, 0, right), (0, f, top), (0, -f, bottom)]
         return np.array(normals), np.array([NEAR, 0, 0, 0, 0])
 
-    def sees(self, points: NDArray[np.float64]) -> bool:
+    def sees(self, points: Array) -> bool:
         """Return whether all points (n, 3) in the camera frame lie in front and within :attr:`reach`."""
         distance = np.hypot(points[:, 0], points[:, 1])
         return bool((points[:, 2] >= NEAR).all() and (distance <= self.reach * points[:, 2]).all())
 
 
-def transform_points(transform: NDArray[np.float64], points: ArrayLike) -> NDArray[np.float64]:
+def transform_points(transform: Array, points: ArrayLike) -> Array:
     """Return points (n, 3) taken through a (4, 4) homogeneous matrix."""
     return np.asarray(points, dtype=float) @ transform[:3, :3].T + transform[:3, 3]
 
 
-def invert_pose(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+def invert_pose(pose: Array) -> Array:
     """Return the inverse of a rigid (4, 4) homogeneous matrix."""
     inverse = np.eye(4)
     inverse[:3, :3] = pose[:3, :3].T
@@ -140,7 +139,7 @@ def invert_pose(pose: NDArray[np.float64]) -> NDArray[np.float64]:
     return inverse
 
 
-def look_at(position: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> NDArray[np.float64]:
+def look_at(position: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> Array:
     """Return ``camera_in_world`` (4, 4) of an upright camera at ``position`` aimed at ``target`` [m]."""
     position = np.asarray(position, dtype=float)
     forward = np.asarray(target, dtype=float) - position
@@ -154,7 +153,7 @@ def look_at(position: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0.0, 1
     return pose
 
 
-def clip_half_space(polygon: NDArray[np.float64], normal: ArrayLike, offset: float) -> NDArray[np.float64]:
+def clip_half_space(polygon: Array, normal: ArrayLike, offset: float) -> Array:
     """Return the part (m, 3) of a convex polygon (n, 3) where ``points @ normal >= offset``."""
     beyond = polygon @ np.asarray(normal, dtype=float) - offset
     if (beyond >= 0).all():

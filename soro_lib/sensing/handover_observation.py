@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from soro_lib.checks import Array, numbers
 from soro_lib.moved import old_names
 
 
@@ -33,9 +31,9 @@ class HandoverObservation:
         If wrist, direction or ball does not have three components.
     """
 
-    wrist: NDArray[np.float64] | None
-    direction: NDArray[np.float64] | None
-    ball: NDArray[np.float64] | None
+    wrist: Array | None
+    direction: Array | None
+    ball: Array | None
     wrist_deviation: float = 0.007
     direction_deviation: float = 0.05
     ball_deviation: float = 0.002
@@ -44,9 +42,8 @@ class HandoverObservation:
 
     def __post_init__(self) -> None:
         for name in ("wrist", "direction", "ball"):
-            vector = getattr(self, name)
-            if vector is not None and np.shape(vector) != (3,):
-                raise ValueError(f"{name} must have shape (3,) or be None, got shape {np.shape(vector)}")
+            if getattr(self, name) is not None:
+                numbers(name, getattr(self, name), (3,))
 
 
 __getattr__ = old_names(__name__)

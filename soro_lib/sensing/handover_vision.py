@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soro_lib.checks import Array, one_of
 from soro_lib.sensing.camera import Image
 from soro_lib.sensing.handover_observation import HandoverObservation
 from soro_lib.sensing.marker_pose import (
@@ -51,7 +51,7 @@ class Look:
     """
 
     observation: HandoverObservation
-    markers: list[dict[int, NDArray[np.float64]]]
+    markers: list[dict[int, Array]]
     balls: list[list[BallSight]]
     chosen: list[BallSight | None]
     complaints: list[str]
@@ -73,9 +73,9 @@ class Sight:
     """
 
     camera: CalibratedCamera
-    markers: dict[int, NDArray[np.float64]]
-    candidates: NDArray[np.float64]
-    cosines: NDArray[np.float64]
+    markers: dict[int, Array]
+    candidates: Array
+    cosines: Array
 
 
 @dataclass
@@ -123,8 +123,7 @@ class HandoverVision:
     largest_gap: float = 0.010
 
     def __post_init__(self) -> None:
-        if self.estimator not in ESTIMATORS:
-            raise ValueError(f"estimator must be one of {', '.join(ESTIMATORS)}, got {self.estimator!r}")
+        one_of("estimator", self.estimator, ESTIMATORS)
         if len(self.cameras) < 2:
             raise ValueError(f"two cameras are needed at least, got {len(self.cameras)}")
         self.marker_detector = MarkerDetector(self.ring, corner_shift=self.corner_shift)
@@ -137,8 +136,8 @@ class HandoverVision:
         self._last_pictures: list[bytes | None] = [None] * count
         self._marker_windows: list[Window | None] = [None] * count
         self._ball_windows: list[Window | None] = [None] * count
-        self._last_points: NDArray[np.float64] | None = None
-        self._last_ball: NDArray[np.float64] | None = None
+        self._last_points: Array | None = None
+        self._last_ball: Array | None = None
 
     def look(self, images: Sequence[Image | None]) -> Look:
         """Return what the images (one per camera, blue, green, red) show.
@@ -162,33 +161,25 @@ class HandoverVision:
         if apart > self.largest_disagreement:
             pose = ball = None
             trouble = f"the cameras put the wrist {1e3 * apart:.0f} mm apart: swapped or moved?"
+        status = "; ".join(text for text in (trouble, *complaints) if text)
+        observation = HandoverObservation(None, None, ball, disagreement=gap, status=status)
         if pose is not None:
             gripper = pose.wrist + self.gripper_length * pose.direction
             self._last_points = np.concatenate([pose.wrist, gripper])
-        status = "; ".join(text for text in (trouble, *complaints) if text)
-        observation = HandoverObservation(
-            wrist=None if pose is None else pose.wrist,
-            direction=None if pose is None else pose.direction,
-            ball=ball,
-            disagreement=gap,
-            status=status,
-        )
-        if pose is not None:
-            observation = replace(
-                observation,
-                wrist_deviation=pose.wrist_deviation,
-                direction_deviation=pose.direction_deviation,
+            deviations = pose.wrist_deviation, pose.direction_deviation
+            observation = HandoverObservation(
+                pose.wrist, pose.direction, ball, *deviations, disagreement=gap, status=status
             )
         if ball is not None:
             clear = min(sight.fill for sight in chosen if sight is not None) > CLEAR_FILL
             observation = replace(observation, ball_deviation=0.001 if clear else 0.010)
         return Look(observation, markers, balls, chosen, complaints)
 
-    def estimate(self, markers: Sequence[dict[int, NDArray[np.float64]]], estimator: str) -> WristPose | None:
+    def estimate(self, markers: Sequence[dict[int, Array]], estimator: str) -> WristPose | None:
         """Return the wrist that an estimator makes of the markers of each camera; None without markers."""
         return self._pose(self._sights(markers), estimator)
 
-    def _sights(self, markers: Sequence[dict[int, NDArray[np.float64]]]) -> list[Sight]:
+    def _sights(self, markers: Sequence[dict[int, Array]]) -> list[Sight]:
         """Return what the cameras make of their markers, of those that see any."""
         sights = []
         for camera, seen in zip(self.cameras, markers):
@@ -225,7 +216,7 @@ class HandoverVision:
         self._last_pictures[index] = picture
         return f"camera {index + 1}: frozen" if picture == last else ""
 
-    def _markers(self, index: int, image: Image) -> dict[int, NDArray[np.float64]]:
+    def _markers(self, index: int, image: Image) -> dict[int, Array]:
         """Return the markers in an image, looked for around their last place, then everywhere."""
         window = self._marker_windows[index]
         seen = self.marker_detector.detect(image, window) if window else {}
@@ -252,9 +243,7 @@ class HandoverVision:
         wrists = [pose.wrist for pose in alone if pose is not None]
         return max((float(np.linalg.norm(a - b)) for a, b in combinations(wrists, 2)), default=0.0)
 
-    def _ball(
-        self, balls: Sequence[list[BallSight]]
-    ) -> tuple[NDArray[np.float64] | None, float, list[BallSight | None]]:
+    def _ball(self, balls: Sequence[list[BallSight]]) -> tuple[Array | None, float, list[BallSight | None]]:
         """Return the ball's place (3,), the gap of its rays [m] and the circle taken from each camera."""
         chosen: list[BallSight | None] = [None] * len(balls)
         self._ball_windows = [None] * len(balls)
@@ -279,7 +268,7 @@ class HandoverVision:
 
     def _meetings(
         self, balls: Sequence[list[BallSight]], seeing: list[int]
-    ) -> Iterator[tuple[NDArray[np.float64], float, tuple[BallSight, ...]]]:
+    ) -> Iterator[tuple[Array, float, tuple[BallSight, ...]]]:
         """Yield the place, the gap and the circles of every ball that the seeing cameras can agree on, the
         largest circles first; for the thesis, the largest circles alone, whether they agree or not."""
         if len(seeing) < 2:
@@ -293,15 +282,13 @@ class HandoverVision:
             if gap < self.largest_gap and self._right_size(seeing, sights, place):
                 yield place, gap, sights
 
-    def _meet(self, seeing: list[int], sights: tuple[BallSight, ...]) -> tuple[NDArray[np.float64], float]:
+    def _meet(self, seeing: list[int], sights: tuple[BallSight, ...]) -> tuple[Array, float]:
         rays = [self.cameras[i].rays([sight.centre]) for i, sight in zip(seeing, sights)]
         origins = np.array([origin for origin, _ in rays])
         directions = np.array([direction[0] for _, direction in rays])
         return triangulate(origins, directions), ray_gap(origins, directions)
 
-    def _right_size(
-        self, seeing: list[int], sights: tuple[BallSight, ...], place: NDArray[np.float64]
-    ) -> bool:
+    def _right_size(self, seeing: list[int], sights: tuple[BallSight, ...], place: Array) -> bool:
         """Return whether no circle is larger than the ball could be there, or far too small."""
         for i, sight in zip(seeing, sights):
             camera = self.cameras[i]

@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from soro_lib.checks import Array
 from soro_lib.sensing.marker_ring import MarkerRing
 from soro_lib.sensing.stereo_vision import CalibratedCamera
 
-Markers = Mapping[int, NDArray[np.float64]]
+Markers = Mapping[int, Array]
 """Corners (4, 2) [px] of the markers that one camera sees, by id."""
 
 AGREEMENT = 0.040
@@ -54,15 +54,15 @@ class WristPose:
         ``wrist_in_world``, if the estimator gives one.
     """
 
-    wrist: NDArray[np.float64]
-    direction: NDArray[np.float64]
+    wrist: Array
+    direction: Array
     wrist_deviation: float
     direction_deviation: float
     markers: int
-    pose: NDArray[np.float64] | None = None
+    pose: Array | None = None
 
 
-def wrist_candidates(markers: Markers, camera: CalibratedCamera, ring: MarkerRing) -> NDArray[np.float64]:
+def wrist_candidates(markers: Markers, camera: CalibratedCamera, ring: MarkerRing) -> Array:
     """Return ``wrist_in_world`` (m, 2, 4, 4) of both poses of every marker, the better reprojection first."""
     half = ring.marker / 2
     square = np.array([(-half, half, 0), (half, half, 0), (half, -half, 0), (-half, -half, 0)])
@@ -82,13 +82,13 @@ def wrist_candidates(markers: Markers, camera: CalibratedCamera, ring: MarkerRin
     return candidates
 
 
-def _rays(markers: Markers, camera: CalibratedCamera) -> NDArray[np.float64]:
+def _rays(markers: Markers, camera: CalibratedCamera) -> Array:
     """Return x/z and y/z (m, 4, 2) of the corners of the markers in the camera frame."""
     rays = camera.camera.rays(np.concatenate(list(markers.values())))[:, :2]
     return np.ascontiguousarray(rays).reshape(-1, 4, 2)
 
 
-def average_pose(candidates: NDArray[np.float64]) -> WristPose:
+def average_pose(candidates: Array) -> WristPose:
     """Return the plain average over all markers of all cameras (Vervloet, Section 3.2.4).
 
     Parameters
@@ -100,10 +100,10 @@ def average_pose(candidates: NDArray[np.float64]) -> WristPose:
 
 
 def consensus_pose(
-    candidates: NDArray[np.float64],
-    cosines: NDArray[np.float64],
+    candidates: Array,
+    cosines: Array,
     gripper_length: float,
-    expected: NDArray[np.float64] | None = None,
+    expected: Array | None = None,
 ) -> WristPose:
     """Return the weighted mean over the markers that agree, each with the pose that agrees better.
 
@@ -134,7 +134,7 @@ def consensus_pose(
     return _mean(chosen, cosines[every, nearest][kept] ** 2)
 
 
-def _mean(poses: NDArray[np.float64], weights: NDArray[np.float64]) -> WristPose:
+def _mean(poses: Array, weights: Array) -> WristPose:
     """Return the weighted mean of wrist and direction; the claimed deviations are those of the mean."""
     share = weights / weights.sum()
     wrists, directions = poses[:, :3, 3], poses[:, :3, 2]
@@ -142,7 +142,7 @@ def _mean(poses: NDArray[np.float64], weights: NDArray[np.float64]) -> WristPose
     direction /= np.linalg.norm(direction)
     effective = 1 / np.sum(share**2)
 
-    def deviation(values: NDArray[np.float64], mean: NDArray[np.float64], alone: float) -> float:
+    def deviation(values: Array, mean: Array, alone: float) -> float:
         """Return the deviation of the mean of values, each at least half as uncertain as one marker alone."""
         spread = np.sqrt(share @ np.mean((values - mean) ** 2, axis=1))
         return float(np.hypot(spread, alone / 2) / np.sqrt(effective))
@@ -161,7 +161,7 @@ def _mean(poses: NDArray[np.float64], weights: NDArray[np.float64]) -> WristPose
 
 
 def joint_pose(
-    start: NDArray[np.float64],
+    start: Array,
     sights: Sequence[tuple[CalibratedCamera, Markers]],
     ring: MarkerRing,
     iterations: int = 8,
@@ -213,12 +213,10 @@ def joint_pose(
     )
 
 
-def _all_corners(
-    sights: Sequence[tuple[CalibratedCamera, Markers]], ring: MarkerRing
-) -> tuple[NDArray[np.float64], ...]:
+def _all_corners(sights: Sequence[tuple[CalibratedCamera, Markers]], ring: MarkerRing) -> tuple[Array, ...]:
     """Return for every seen corner its place in the ring, its camera's rotation and position, its ray (x/z,
     y/z) and the focal length."""
-    columns: list[tuple[NDArray[np.float64], ...]] = []
+    columns: list[tuple[Array, ...]] = []
     for camera, markers in sights:
         for number, rays in zip(markers, _rays(markers, camera)):
             columns.append(
@@ -233,15 +231,13 @@ def _all_corners(
     return tuple(np.concatenate(column) for column in zip(*columns))
 
 
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cross(a: Array, b: Array) -> Array:
     """Return the vector products (..., 3); np.cross spends most of its time on the order of its axes."""
     ax, ay, az, bx, by, bz = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
-def viewing_cosines(
-    candidates: NDArray[np.float64], markers: Markers, camera: CalibratedCamera, ring: MarkerRing
-) -> NDArray[np.float64]:
+def viewing_cosines(candidates: Array, markers: Markers, camera: CalibratedCamera, ring: MarkerRing) -> Array:
     """Return the cosine (m, 2) of the angle between each marker's normal and the line to the camera, for both
     of its poses."""
     in_ring = ring.marker_poses[list(markers)]

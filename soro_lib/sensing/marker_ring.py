@@ -5,8 +5,8 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from soro_lib.checks import Array, check_fields
 from soro_lib.sensing.camera import Image, invert_pose, transform_points
 
 
@@ -37,13 +37,8 @@ class MarkerRing:
     dictionary: int = cv2.aruco.DICT_4X4_50
 
     def __post_init__(self) -> None:
-        if self.sides < 3:
-            raise ValueError(f"MarkerRing.sides must be at least 3, got {self.sides}")
-        if not 0 < self.marker < min(self.width, self.height):
-            raise ValueError(
-                f"MarkerRing.marker must be positive and smaller than its facet of "
-                f"{self.width} x {self.height} m, got {self.marker}"
-            )
+        check_fields(self, "sides", at_least=3)
+        check_fields(self, "marker", above=0, below=min(self.width, self.height))
 
     @property
     def apothem(self) -> float:
@@ -51,7 +46,7 @@ class MarkerRing:
         return float(self.width / 2 / np.tan(np.pi / self.sides))
 
     @cached_property
-    def marker_poses(self) -> NDArray[np.float64]:
+    def marker_poses(self) -> Array:
         """Return ``marker_in_wrist`` (sides, 4, 4) of every marker's middle."""
         angles = 2 * np.pi * np.arange(self.sides) / self.sides
         poses = np.tile(np.eye(4), (self.sides, 1, 1))
@@ -62,18 +57,18 @@ class MarkerRing:
         return poses
 
     @cached_property
-    def wrist_in_markers(self) -> NDArray[np.float64]:
+    def wrist_in_markers(self) -> Array:
         """Return the inverse (sides, 4, 4) of every marker's pose."""
         return np.array([invert_pose(pose) for pose in self.marker_poses])
 
     @cached_property
-    def marker_corners(self) -> NDArray[np.float64]:
+    def marker_corners(self) -> Array:
         """Return the corners (sides, 4, 3) [m] in the wrist frame, in OpenCV's order: clockwise from top
         left."""
         return self._rectangles(self.marker, self.marker)
 
     @cached_property
-    def facets(self) -> NDArray[np.float64]:
+    def facets(self) -> Array:
         """Return the corners (sides, 4, 3) [m] of the white facets in the wrist frame."""
         return self._rectangles(self.width, self.height)
 
@@ -96,6 +91,6 @@ class MarkerRing:
             pictures.append(picture)
         return tuple(pictures)
 
-    def _rectangles(self, width: float, height: float) -> NDArray[np.float64]:
+    def _rectangles(self, width: float, height: float) -> Array:
         corners = np.array([(-1, 1, 0), (1, 1, 0), (1, -1, 0), (-1, -1, 0)]) * (width / 2, height / 2, 0)
         return np.array([transform_points(pose, corners) for pose in self.marker_poses])

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import Array, finite, numbers
 from soro_lib.sensing.camera import Camera, Image, invert_pose, transform_points
 from soro_lib.sensing.marker_ring import MarkerRing
 
@@ -41,15 +42,15 @@ class CalibratedCamera:
     """
 
     camera: Camera
-    pose: NDArray[np.float64]
+    pose: Array
     reprojection: float = 0.0
 
-    def rays(self, pixels: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def rays(self, pixels: ArrayLike) -> tuple[Array, Array]:
         """Return origin (3,) [m] and unit directions (n, 3), in the world, of pixels (n, 2) as seen."""
         rays = self.camera.rays(pixels) @ self.pose[:3, :3].T
         return self.pose[:3, 3], rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
-    def project(self, points: ArrayLike) -> NDArray[np.float64]:
+    def project(self, points: ArrayLike) -> Array:
         """Return the pixels (n, 2) of points (n, 3) [m] of the world."""
         return self.camera.project(transform_points(invert_pose(self.pose), points))
 
@@ -58,7 +59,7 @@ BOX_SIZE = (0.20, 0.16, 0.12)
 """Edges of the calibration box along x, y, z [m]; the thesis prints only that six corners are used."""
 
 
-def box_corners(middle: ArrayLike = (0.0, 0.0, 0.66)) -> NDArray[np.float64]:
+def box_corners(middle: ArrayLike = (0.0, 0.0, 0.66)) -> Array:
     """Return six corners (6, 3) [m] of the calibration box that both cameras see: the near face, and the far
     edge of its top."""
     near = [(-1, 1, -1), (1, 1, -1), (1, 1, 1), (-1, 1, 1)]
@@ -88,15 +89,8 @@ def calibrate(
         If there are too few points, a value is not finite, a corner would lie behind the camera, or the pose
         does not explain the pixels, as when corners were selected in another order.
     """
-    world = np.asarray(corners, dtype=float)
-    seen = np.asarray(pixels, dtype=float)
-    if world.ndim != 2 or world.shape[1:] != (3,) or len(world) < 6 or seen.shape != (len(world), 2):
-        raise CalibrationError(
-            f"calibration needs at least 6 corners (n, 3) and as many pixels (n, 2), "
-            f"got {world.shape} and {seen.shape}"
-        )
-    if not (np.isfinite(world).all() and np.isfinite(seen).all()):
-        raise CalibrationError("calibration: corners and pixels must be finite")
+    world = finite("calibration: corners", corners, ("n >= 6", 3), CalibrationError)
+    seen = finite("calibration: pixels", pixels, (len(world), 2), CalibrationError)
     for start in (None, cv2.SOLVEPNP_SQPNP):
         world_in_camera = _corner_pose(camera, world, seen, start)
         in_camera = transform_points(world_in_camera, world)
@@ -112,9 +106,7 @@ def calibrate(
     )
 
 
-def _corner_pose(
-    camera: Camera, corners: NDArray[np.float64], pixels: NDArray[np.float64], start: int | None
-) -> NDArray[np.float64]:
+def _corner_pose(camera: Camera, corners: Array, pixels: Array, start: int | None) -> Array:
     """Return ``world_in_camera`` (4, 4) by least squares, from OpenCV's own start or another method's.
 
     Its own is a linear solution, which on six corners of a box with ordinary selection errors can lead
@@ -132,7 +124,7 @@ def _corner_pose(
     return pose
 
 
-def triangulate(origins: ArrayLike, directions: ArrayLike) -> NDArray[np.float64]:
+def triangulate(origins: ArrayLike, directions: ArrayLike) -> Array:
     """Return the point closest to all rays, in the sense of least squares (Vervloet, Section 3.2.2).
 
     For two rays it is the middle of the shortest line between them.
@@ -175,15 +167,14 @@ def ray_gap(origins: ArrayLike, directions: ArrayLike) -> float:
     return float(2 * np.linalg.norm(np.cross(along, offset), axis=-1).max())
 
 
-def _checked_rays(
-    origins: ArrayLike, directions: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    start, along = np.broadcast_arrays(np.asarray(origins, dtype=float), np.asarray(directions, dtype=float))
-    if start.ndim < 2 or start.shape[-1] != 3 or start.shape[-2] < 2:
-        raise ValueError(f"triangulate: rays must have shape (..., n >= 2, 3), got {start.shape}")
+def _checked_rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Array, Array]:
+    start, along = np.broadcast_arrays(
+        finite("triangulate: origins", origins), finite("triangulate: directions", directions)
+    )
+    numbers("triangulate: rays", start, (..., "n >= 2", 3))
     lengths = np.linalg.norm(along, axis=-1, keepdims=True)
-    if not (np.isfinite(start).all() and np.isfinite(along).all() and (lengths > 0).all()):
-        raise ValueError("triangulate: origins must be finite, directions finite and not zero")
+    if not lengths.all():
+        raise ValueError("triangulate: directions must not be zero")
     return start, along / lengths
 
 
@@ -310,7 +301,7 @@ class MarkerDetector:
     smallest_side: float = 10.0
     corner_shift: float = CORNER_SHIFT
 
-    def detect(self, image: Image, window: Window | None = None) -> dict[int, NDArray[np.float64]]:
+    def detect(self, image: Image, window: Window | None = None) -> dict[int, Array]:
         """Return the corners (4, 2) [px] of each marker of the ring that is seen in a picture (h, w, 3), by
         id."""
         part = image if window is None else image[window]

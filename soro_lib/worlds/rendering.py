@@ -22,6 +22,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import Array, check_fields, finite
 from soro_lib.sensing.camera import Camera, Image, invert_pose, transform_points
 
 Region = tuple[slice, slice]
@@ -35,10 +36,10 @@ class Drawable(Protocol):
         """Return the layer; a lower one is drawn first, whatever the distance (floors, backgrounds)."""
 
     @property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> Array:
         """Return the point (3,) [m] in the world whose distance from the camera sets the painting order."""
 
-    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
+    def draw(self, image: Image, camera: Camera, world_in_camera: Array) -> None:
         """Paint into ``image``, in place."""
 
 
@@ -70,17 +71,13 @@ class TexturedQuad:
     :attr:`Camera.reach` is left out.
     """
 
-    corners: NDArray[np.float64]
+    corners: Array
     texture: Image
     layer: int = 0
     supersampling: int = 1
 
     def __post_init__(self) -> None:
-        corners = np.asarray(self.corners, dtype=float)
-        if corners.shape != (4, 3) or not np.isfinite(corners).all():
-            raise ValueError(
-                f"TexturedQuad.corners must be four finite points (4, 3), got shape {corners.shape}"
-            )
+        corners = finite("TexturedQuad.corners", self.corners, (4, 3))
         gap = corners[0] - corners[1] + corners[2] - corners[3]
         if np.abs(gap).max() > 1e-6:
             raise ValueError("TexturedQuad.corners must form a parallelogram")
@@ -89,7 +86,7 @@ class TexturedQuad:
         object.__setattr__(self, "corners", corners)
 
     @cached_property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> Array:
         """Return the centre of the quad (3,) [m]."""
         return self.corners.mean(axis=0)
 
@@ -108,7 +105,7 @@ class TexturedQuad:
                 pieces.append(TexturedQuad(corners, texture, self.layer, self.supersampling))
         return pieces
 
-    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
+    def draw(self, image: Image, camera: Camera, world_in_camera: Array) -> None:
         """Paint the quad into ``image``, in place."""
         corners = transform_points(world_in_camera, self.corners)
         right, down = self._edges(corners)
@@ -137,7 +134,7 @@ class TexturedQuad:
         paste(image, region, patch, mask)
 
     @staticmethod
-    def _edges(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _edges(corners: Array) -> tuple[Array, Array]:
         return corners[1] - corners[0], corners[3] - corners[0]
 
 
@@ -155,16 +152,16 @@ class Polygon:
         Painting layer, see :class:`Drawable`.
     """
 
-    corners: NDArray[np.float64]
+    corners: Array
     color: int | tuple[int, int, int]
     layer: int = 0
 
     @cached_property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> Array:
         """Return the mean of the corners (3,) [m]."""
         return np.mean(self.corners, axis=0)
 
-    def draw(self, image: Image, camera: Camera, world_in_camera: NDArray[np.float64]) -> None:
+    def draw(self, image: Image, camera: Camera, world_in_camera: Array) -> None:
         """Paint the polygon into ``image``, in place, with softened edges."""
         outline = camera.clip(transform_points(world_in_camera, self.corners))
         if len(outline) < 3 or (camera.distortion and not camera.sees(outline)):
@@ -202,9 +199,7 @@ def render(
     ValueError
         If the pose is not a finite (4, 4) matrix or the background picture has another size than the image.
     """
-    camera_in_world = np.asarray(camera_in_world, dtype=float)
-    if camera_in_world.shape != (4, 4) or not np.isfinite(camera_in_world).all():
-        raise ValueError(f"camera_in_world must be a finite (4, 4) matrix, got shape {camera_in_world.shape}")
+    camera_in_world = finite("camera_in_world", camera_in_world, (4, 4))
     if isinstance(background, np.ndarray):
         if background.shape[:2] != (camera.height, camera.width):
             raise ValueError(
@@ -251,13 +246,8 @@ class Photometry:
     motion: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name in ("gain", "read_noise", "shot_noise", "blur"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise ValueError(
-                    f"Photometry.{name} must be finite and not negative, got {getattr(self, name)}"
-                )
-        if not np.isfinite(self.motion).all():
-            raise ValueError(f"Photometry.motion must be finite, got {self.motion}")
+        check_fields(self, "gain", "read_noise", "shot_noise", "blur", at_least=0)
+        check_fields(self, "motion", shape=(2,))
 
 
 def expose(image: Image, photometry: Photometry, noise: NDArray[np.float32]) -> Image:
@@ -270,8 +260,7 @@ def expose(image: Image, photometry: Photometry, noise: NDArray[np.float32]) -> 
     photometry : Photometry
         Gain, noise and blur. The variance of a pixel is ``read_noise**2 + shot_noise * signal``.
     noise : array of the image's shape, float32
-        Standard normal numbers: ``rng.standard_normal(image.shape, dtype=np.float32)``, or from a
-        :class:`NoiseBank` where drawing that many takes too long.
+        Standard normal numbers: ``rng.standard_normal(image.shape, dtype=np.float32)``.
 
     Returns
     -------
@@ -304,30 +293,7 @@ def motion_kernel(right: float, down: float) -> NDArray[np.float32]:
     return kernel / kernel.sum()
 
 
-class NoiseBank:
-    """Sensor noise for long films: a few noise pictures made once, shifted at random for every frame.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Shape of the images.
-    rng : numpy.random.Generator
-        Source of the pictures.
-    count : int, optional
-        Number of pictures.
-    """
-
-    def __init__(self, shape: tuple[int, ...], rng: np.random.Generator, count: int = 6) -> None:
-        self._pictures = rng.standard_normal((count, *shape), dtype=np.float32)
-
-    def draw(self, rng: np.random.Generator) -> NDArray[np.float32]:
-        """Return standard normal noise of the bank's shape, float32."""
-        picture = self._pictures[rng.integers(len(self._pictures))]
-        rows, columns = (int(rng.integers(size)) for size in picture.shape[:2])
-        return np.roll(picture, (rows, columns), axis=(0, 1))
-
-
-def image_region(pixels: NDArray[np.float64], image: Image) -> Region | None:
+def image_region(pixels: Array, image: Image) -> Region | None:
     """Return the rows and columns of the image that the pixels (n, 2) span, or None if they miss it."""
     (left, top), (right, bottom) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
     rows = slice(max(0, floor(top)), min(image.shape[0], ceil(bottom) + 1))
@@ -355,9 +321,7 @@ def _image(picture: object) -> Image:
     return np.asarray(picture, dtype=np.uint8)
 
 
-def _into_region(
-    homography: NDArray[np.float64], region: Region, supersampling: int
-) -> tuple[NDArray[np.float64], tuple[int, int]]:
+def _into_region(homography: Array, region: Region, supersampling: int) -> tuple[Array, tuple[int, int]]:
     """Return the homography into the supersampled region, and the region's size (width, height) there."""
     rows, columns = region
     centre = 0.5 * (supersampling - 1)
@@ -372,7 +336,7 @@ def _into_region(
     return shift @ homography, size
 
 
-def _polygon_mask(pixels: NDArray[np.float64], region: Region, supersampling: int) -> Image:
+def _polygon_mask(pixels: Array, region: Region, supersampling: int) -> Image:
     """Return a mask of the supersampled region, 255 inside the convex polygon of pixels (n, 2)."""
     shift, (width, height) = _into_region(np.eye(3), region, supersampling)
     inside = np.clip(pixels * shift[0, 0] + shift[:2, 2], -1e6, 1e6)
@@ -381,7 +345,7 @@ def _polygon_mask(pixels: NDArray[np.float64], region: Region, supersampling: in
     return mask
 
 
-def _fixed_point(pixels: NDArray[np.float64]) -> NDArray[np.int32]:
+def _fixed_point(pixels: Array) -> NDArray[np.int32]:
     """Return pixel coordinates with four fractional bits, for OpenCV's drawing functions."""
     return np.round(np.clip(pixels, -1e6, 1e6) * 16).astype(np.int32)
 
@@ -392,7 +356,7 @@ def _white(height: int, width: int) -> Image:
     return np.full((height, width), 255, dtype=np.uint8)
 
 
-def _triple_product(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> float:
+def _triple_product(a: Array, b: Array, c: Array) -> float:
     """Return the determinant of three vectors (3,), on single numbers, which are quicker than arrays."""
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = a.tolist(), b.tolist(), c.tolist()
     return float((ay * bz - az * by) * cx + (az * bx - ax * bz) * cy + (ax * by - ay * bx) * cz)

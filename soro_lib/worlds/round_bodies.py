@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from soro_lib.checks import Array
 from soro_lib.sensing.camera import NEAR, Camera, Image, transform_points
 from soro_lib.worlds.rendering import image_region, paste
 
-Array = NDArray[np.float64]
 Color = tuple[int, int, int]
 """Blue, green, red."""
 
@@ -26,7 +26,7 @@ STRIP_SHADES = (0.62, 0.85, 1.0, 0.8)
 
 
 @dataclass(frozen=True, eq=False)
-class Sphere:
+class Ball:
     """A matt ball under one distant lamp; its outline and shading are exact for every pixel.
 
     Parameters

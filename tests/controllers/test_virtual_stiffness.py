@@ -79,13 +79,6 @@ def test_algorithm_2_written_out(q):
     np.testing.assert_allclose(changed, softness)
 
 
-def test_a_diagonal_matrix_of_stiffness_works_as_its_diagonal():
-    q = np.array([1.0, 0, 0.2, 0, 0, 0.24, 0, 0, 0.24])
-    vector, matrix = limit_state(q, SOFTNESS), limit_state(q, np.diag(SOFTNESS))
-    np.testing.assert_array_equal(vector[0], matrix[0])
-    np.testing.assert_array_equal(np.diag(vector[1]), matrix[1])
-
-
 @given(st.integers(0, 2**32 - 1))
 def test_pseudo_inverse_is_the_weighted_least_norm(seed):
     """The step solves the reachable part of J dq = e and costs least in the stiffness norm."""
@@ -230,7 +223,7 @@ def test_bad_input_is_named(position):
 
 
 def test_limit_state_refuses_what_is_no_state():
-    with pytest.raises(ValueError, match="nine finite numbers"):
+    with pytest.raises(ValueError, match=r"q must be finite, got nan at index \(0,\)"):
         limit_state([np.nan] * 9, SOFTNESS)
     with pytest.raises(ValueError, match="inverse_stiffness"):
         limit_state(ARM.home, [1.0, 2.0])

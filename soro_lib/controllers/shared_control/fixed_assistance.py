@@ -6,14 +6,15 @@ Source: Stroppa et al., Eqs. (4) and (5).
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from soro_lib.checks import not_negative, positive, sample_count, vector
+from soro_lib.checks import Array, not_negative, positive, vector
 from soro_lib.controllers.shared_control.guidance import (
     Guidance,
     damped_magnitude,
     distance_to_goal,
     guidance_force,
+    sample_count,
 )
 from soro_lib.jit import inlined
 
@@ -41,7 +42,7 @@ FIXED_START = FixedState(distance=-1.0, place=0, magnitude=0.0)
 
 @inlined
 def fixed_step(
-    rule: FixedRule, state: FixedState, window: NDArray[np.float64], distance: float, samples: float
+    rule: FixedRule, state: FixedState, window: Array, distance: float, samples: float
 ) -> FixedState:
     """One iteration of the fixed assistance (Stroppa et al., Eqs. (4) and (5)); ``window`` is overwritten."""
     rate = 0.0

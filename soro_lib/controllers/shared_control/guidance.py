@@ -6,10 +6,7 @@ Source: Stroppa et al., Eqs. (2) and (4).
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from soro_lib.checks import Vector
+from soro_lib.checks import Array, Vector, positive
 from soro_lib.jit import inlined
 
 
@@ -81,5 +78,10 @@ class Guidance:
 
     stiffness: float
     magnitude: float
-    force: NDArray[np.float64]
+    force: Array
     state: str
+
+
+def sample_count(elapsed: float | None, sample_rate: float) -> float:
+    """Return the time since the last sample [s] in sample periods; one where no time is given."""
+    return 1.0 if elapsed is None else positive("elapsed", elapsed) * sample_rate
