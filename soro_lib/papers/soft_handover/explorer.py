@@ -21,7 +21,7 @@ from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
 from soro_lib.papers.soft_handover.calibration import plant_k
 from soro_lib.papers.soft_handover.figures.vision import annotated, explorer_view
 from soro_lib.papers.soft_handover.world.observer import RenderedObserver, calibrate_on_box
-from soro_lib.papers.soft_handover.world.plant import ElasticPlant, Gripper, Hand, HelixPlant
+from soro_lib.papers.soft_handover.world.plant import ElasticPlant, Gripper, HelixPlant, HoldingHand
 from soro_lib.papers.soft_handover.world.scene import STEREO
 from soro_lib.replication import as_image
 from soro_lib.replication.frontend import is_live
@@ -102,7 +102,9 @@ class HandoverSession:
             return False
         hand = None
         if self.push is not None:
-            hand = Hand(np.concatenate([self.push + self.controller.arm.gripper_length * UP, self.push]))
+            hand = HoldingHand(
+                np.concatenate([self.push + self.controller.arm.gripper_length * UP, self.push])
+            )
         pulled = self.controller.parameters.motors.pull(self.command.tendon_change)
         self.state = self.plant.settle(pulled, hand)
         self.steps += 1

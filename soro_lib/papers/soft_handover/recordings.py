@@ -8,9 +8,10 @@ locked packages give the same bytes, whatever the number of jobs.
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from multiprocessing import Manager
 from pathlib import Path
@@ -21,15 +22,8 @@ import pandas as pd
 from rich.progress import Progress
 
 from soro_lib.papers.soft_handover.calibration import plant_k
-from soro_lib.papers.soft_handover.experiments.rendered_handovers import controllers, rendered_block
-from soro_lib.papers.soft_handover.experiments.vision import (
-    SEED,
-    NoiseSources,
-    Report,
-    accuracy,
-    noise_figures,
-    still_looks,
-)
+from soro_lib.papers.soft_handover.experiments.rendered_handovers import BEST, CONTROLLERS, rendered_block
+from soro_lib.papers.soft_handover.experiments.vision import SEED, accuracy, noise_figures, still_looks
 from soro_lib.papers.soft_handover.experiments.vision_limits import degradations, image_faults, occlusion
 from soro_lib.papers.soft_handover.world.plant import ElasticPlant
 from soro_lib.project import data_directory
@@ -38,12 +32,6 @@ from soro_lib.sensing.handover_vision import ESTIMATORS
 
 SLUG = "soft_handover"
 GENERATOR = "soro_lib.papers.soft_handover.recordings"
-POSES = {
-    "vision_accuracy": 200,
-    "vision_occlusion": 200,
-    "vision_degradations": 40,
-    "vision_image_faults": 40,
-}
 BLOCKS = 2
 LOOKS_PER_BLOCK = 1200
 """About what a block takes, for the progress."""
@@ -101,31 +89,14 @@ LABELS = {
 """Meaning of the columns of all recordings."""
 
 
-@dataclass(frozen=True)
-class Job:
-    """A part of the work that gives one or two tables.
-
-    Attributes
-    ----------
-    name : str
-        For the progress; the recording's, where the job gives all of it.
-    arguments : tuple
-        What the study is called with.
-    looks : int
-        About how much it will report.
-    """
-
-    name: str
-    arguments: tuple[Any, ...]
-    looks: int
-
-
-STUDIES: dict[str, Callable[..., pd.DataFrame]] = {
-    "vision_accuracy": accuracy,
-    "vision_occlusion": occlusion,
-    "vision_degradations": degradations,
-    "vision_image_faults": image_faults,
+STUDIES: dict[str, tuple[Callable[..., pd.DataFrame], int]] = {
+    "vision_accuracy": (accuracy, 200),
+    "vision_occlusion": (occlusion, 200),
+    "vision_degradations": (degradations, 40),
+    "vision_image_faults": (image_faults, 40),
+    "vision_still_looks": (still_looks, 40),
 }
+"""What the recordings of single looks are made by, and from how many poses."""
 
 DESCRIPTIONS = {
     "vision_accuracy": "Errors of arm and ball at random poses under every condition of the error budget.",
@@ -138,54 +109,60 @@ DESCRIPTIONS = {
 }
 
 
+@dataclass(frozen=True)
+class Job:
+    """A part of the work.
+
+    Attributes
+    ----------
+    name : str
+        For the progress.
+    recordings : tuple of str
+        What the study gives a table for each of, or a part of it.
+    study : callable
+        Returns the table, or the tables; is told whom to report to.
+    looks : int
+        About how much it will report.
+    """
+
+    name: str
+    recordings: tuple[str, ...]
+    study: Callable[..., Any]
+    looks: int
+
+    def run(self, progress: Any) -> dict[str, pd.DataFrame]:
+        """Return the tables by recording; ``progress[name]`` counts the looks."""
+        cv2.setNumThreads(1)
+        progress[self.name] = 0
+
+        def report(looks: int) -> None:
+            progress[self.name] += looks
+
+        tables = self.study(report=report)
+        return dict(zip(self.recordings, tables if isinstance(tables, tuple) else (tables,)))
+
+
 def jobs(small: bool = False) -> list[Job]:
     """Return all jobs, the longest first; in the small form two handovers, and two poses of all else."""
-    plants = ("K", "E")
+    plants = {"K": plant_k(), "E": ElasticPlant()}
     eyes = list(zip(plants, ESTIMATORS)) if small else list(product(plants, ESTIMATORS))
     handovers = [
         Job(
             f"handovers, plant {plant}, {estimator}, block {block}",
-            (plant, estimator, block, ["best"] if small else list(controllers())),
+            ("rendered_runs", "rendered_traces"),
+            partial(
+                rendered_block, plant, plants[plant], estimator, block, SEED, BEST if small else CONTROLLERS
+            ),
             LOOKS_PER_BLOCK,
         )
         for plant, estimator in eyes
         for block in range(1 if small else BLOCKS)
     ]
-    poses = dict.fromkeys(POSES, 2) if small else POSES
-    still = NoiseSources(poses=2) if small else NoiseSources()
-    return [
-        *handovers,
-        *(Job(name, (count,), count) for name, count in poses.items()),
-        Job("vision_still_looks", (still,), still.poses),
+    looks = [
+        Job(name, (name,), partial(study, 2 if small else count, SEED), 2 if small else count)
+        for name, (study, count) in STUDIES.items()
     ]
-
-
-def run_job(job: Job, progress: Any = None) -> dict[str, pd.DataFrame]:
-    """Return the tables of a job by recording; ``progress[job.name]`` counts its looks."""
-    cv2.setNumThreads(1)
-    done = 0
-
-    def report(looks: int) -> None:
-        nonlocal done
-        done += looks
-        if progress is not None:
-            progress[job.name] = done
-
-    if job.name in STUDIES:
-        return {job.name: STUDIES[job.name](*job.arguments, SEED, report=report)}
-    if job.name == "vision_still_looks":
-        return {job.name: still_looks(job.arguments[0], SEED, report)}
-    plant, estimator, block, names = job.arguments
-    return _handovers(plant, estimator, block, names, report)
-
-
-def _handovers(
-    plant: str, estimator: str, block: int, names: Sequence[str], report: Report
-) -> dict[str, pd.DataFrame]:
-    arm = plant_k() if plant == "K" else ElasticPlant()
-    settings = {name: controllers()[name] for name in names}
-    runs, traces = rendered_block(plant, arm, estimator, block, SEED, report, settings)
-    return {"rendered_runs": runs, "rendered_traces": traces}
+    return [*handovers, *looks]
 
 
 def write_table(name: str, table: pd.DataFrame, directory: Path) -> Path:
@@ -236,33 +213,27 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--only", choices=("vision", "handovers"), help="a part of the recordings")
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
-    todo = [job for job in jobs(options.small) if options.only in (None, part_of(job))]
+    todo = [job for job in jobs(options.small) if job.name.startswith(options.only or "")]
     with Manager() as manager, ProcessPoolExecutor(options.jobs) as pool, Progress() as progress:
         counts = manager.dict()
         bars = {job.name: progress.add_task(job.name, total=job.looks) for job in todo}
-        futures = [pool.submit(run_job, job, counts) for job in todo]
+        futures = [pool.submit(job.run, counts) for job in todo]
         while wait(futures, timeout=0.5).not_done:
             for name, bar in bars.items():
                 progress.update(bar, completed=counts.get(name, 0))
         results = [future.result() for future in futures]
-    names = dict.fromkeys(name for result in results for name in result)
-    tables = {
-        name: pd.concat([result[name] for result in results if name in result], ignore_index=True)
-        for name in names
-    }
-    written = [write_table(name, table, options.output) for name, table in tables.items()]
-    for path in written:
+    parts: dict[str, list[pd.DataFrame]] = {}
+    for name, table in (item for result in results for item in result.items()):
+        parts.setdefault(name, []).append(table)
+    tables = {name: pd.concat(found, ignore_index=True) for name, found in parts.items()}
+    for name, table in tables.items():
+        path = write_table(name, table, options.output)
         print(f"{path.name}  {read_card(path)['sha256']}")
     if "vision_still_looks" in tables:
         still = tables["vision_still_looks"]
         figures = noise_figures(still, tables["vision_occlusion"])
         print(write_noise(figures, int(still["pose"].nunique()), options.output).name)
     return 0
-
-
-def part_of(job: Job) -> str:
-    """Return which part of the recordings a job belongs to."""
-    return "vision" if job.name.startswith("vision") else "handovers"
 
 
 if __name__ == "__main__":

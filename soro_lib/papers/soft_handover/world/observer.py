@@ -14,13 +14,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from soro_lib.checks import not_negative, positive
 from soro_lib.papers.soft_handover.world.scene import (
     STEREO,
     WEBCAM,
     Extras,
     HandoverScene,
     Viewpoint,
-    photograph,
+    photographs,
 )
 from soro_lib.poses import magnitude
 from soro_lib.project import data_directory
@@ -78,15 +79,8 @@ class VisionNoise:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not (np.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} must be finite and at least 0, got {value}")
-        if self.bias_length == 0:
-            raise ValueError("bias_length must be positive")
-
-    def scaled(self, factor: float) -> "VisionNoise":
-        """Return the same budget with all standard deviations multiplied."""
-        lengths = ("bias_length", "occlusion_distance")
-        return VisionNoise(**{k: v if k in lengths else factor * v for k, v in vars(self).items()})
+            not_negative(name, value)
+        positive("bias_length", self.bias_length)
 
 
 NO_NOISE = VisionNoise(0, 0, 0, 0, 0, 0)
@@ -220,7 +214,7 @@ class RenderedObserver:
         """Return what is seen of the true state q (9,) and the true ball (3,) [m]."""
         self._number += 1
         items = self.scene.items(state, ball, self.extras)
-        self.images = [photograph(items, view, self.photometry, rng) for view in self.views]
+        self.images = photographs(items, self.views, self.photometry, rng)
         shown = self.images if self.spoil is None else self.spoil(self._number, self.images)
         self.look = self.vision.look(shown)
         return self.look.observation

@@ -101,18 +101,11 @@ class Extras:
         Ids of markers that a cloth covers.
     second_ball : (float, float, float), optional
         Centre of another green ball [m].
-    grip : float
-        0 for an open gripper, 1 for a closed one.
     """
 
     hand: bool = True
     hidden_markers: frozenset[int] = frozenset()
     second_ball: tuple[float, float, float] | None = None
-    grip: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.grip <= 1:
-            raise ValueError(f"Extras.grip must be in [0, 1], got {self.grip}")
 
 
 @dataclass(frozen=True)
@@ -144,14 +137,9 @@ class HandoverScene:
         if ball.shape != (3,) or not np.isfinite(ball).all():
             raise ValueError(f"ball must be three finite numbers [m], got {ball}")
         wrist = self.wrist(state)
-        items: list[Drawable] = [*self._arm(np.asarray(state, dtype=float)), *self._ring(wrist, extras)]
-        items += self._gripper(wrist, extras.grip)
-        items.append(self.ball(ball))
-        if extras.hand:
-            items += self._hand(ball)
-        if extras.second_ball is not None:
-            items.append(self.ball(np.array(extras.second_ball)))
-        return items
+        items = [*self._arm(np.asarray(state, dtype=float)), *self._ring(wrist, extras.hidden_markers)]
+        items += [*self._gripper(wrist), self.ball(ball), *(self._hand(ball) if extras.hand else [])]
+        return items if extras.second_ball is None else [*items, self.ball(np.array(extras.second_ball))]
 
     def wrist(self, state: ArrayLike) -> NDArray[np.float64]:
         """Return ``wrist_in_world`` (4, 4) for a true state q (9,), which no actuator limits."""
@@ -170,22 +158,21 @@ class HandoverScene:
             for i in range(0, len(points) - 1, slices)
         ]
 
-    def _ring(self, wrist: NDArray[np.float64], extras: Extras) -> list[Drawable]:
-        facets: list[Drawable] = []
-        for number, corners in enumerate(self.ring.facets):
-            covered = number in extras.hidden_markers
-            picture = CLOTH if covered else self.ring.prints[number]
-            facets.append(TexturedQuad(transform_points(wrist, corners), picture, supersampling=3))
-        return facets
+    def _ring(self, wrist: NDArray[np.float64], hidden: frozenset[int]) -> list[Drawable]:
+        pictures = [CLOTH if i in hidden else picture for i, picture in enumerate(self.ring.prints)]
+        return [
+            TexturedQuad(transform_points(wrist, corners), picture, supersampling=3)
+            for corners, picture in zip(self.ring.facets, pictures)
+        ]
 
-    def _gripper(self, wrist: NDArray[np.float64], grip: float) -> list[Drawable]:
-        """Return the palm and three fingers, whose tips close toward the gripper point."""
+    def _gripper(self, wrist: NDArray[np.float64]) -> list[Drawable]:
+        """Return the palm and three open fingers."""
         below = self.ring.height / 2
         length = self.arm.gripper_length
         palm = np.array([(0, 0, below), (0, 0, 0.42 * length)])
         parts: list[Drawable] = [Tube(transform_points(wrist, palm), 0.024, (PLASTIC,))]
         along = np.array([0.38, 0.6, 0.82, 1.05]) * length
-        outward = np.array([0.022, 0.040, 0.042, 0.034]) * (1 - 0.42 * grip * np.array([0, 0.6, 1, 1]))
+        outward = np.array([0.022, 0.040, 0.042, 0.034])
         for angle in 2 * np.pi * np.arange(3) / 3:
             finger = np.column_stack([outward * np.cos(angle), outward * np.sin(angle), along])
             parts.append(Tube(transform_points(wrist, finger), 0.007, (PLASTIC,)))
@@ -206,13 +193,11 @@ class HandoverScene:
         down = -np.array(UP)
         palm = ball + (self.ball_radius + 0.014) * down
         wrist = palm + 0.075 * away + 0.012 * down
+        hand = np.array([palm - 0.03 * away, palm, palm + 0.045 * away, wrist])
+        forearm = np.array([wrist, wrist + 0.10 * away + 0.03 * down])
         parts: list[Drawable] = [
-            Tube(
-                np.array([palm - 0.03 * away, palm, palm + 0.045 * away, wrist]),
-                np.array([0.011, 0.013, 0.014, 0.022]),
-                (SKIN,),
-            ),
-            Tube(np.array([wrist, wrist + 0.10 * away + 0.03 * down]), np.array([0.024, 0.03]), (SKIN,)),
+            Tube(hand, np.array([0.011, 0.013, 0.014, 0.022]), (SKIN,)),
+            Tube(forearm, np.array([0.024, 0.03]), (SKIN,)),
         ]
         elbow, shoulder = wrist + 0.08 * away + 0.025 * down, wrist + 0.28 * away + 0.55 * down
         sleeve = np.linspace(elbow, shoulder, 7)
@@ -235,26 +220,19 @@ def _room(camera: Camera, pose: bytes) -> Image:
     def wall(corners: ArrayLike, color: Color, layer: int) -> Polygon:
         return Polygon(np.array(corners, dtype=float), color, layer)
 
+    def upright(width: ArrayLike, y: float, height: ArrayLike, color: Color, layer: int) -> Polygon:
+        (left, right), (top, bottom) = width, height
+        return wall([(left, y, top), (right, y, top), (right, y, bottom), (left, y, bottom)], color, layer)
+
+    bench = [(-1.9, -1.4, 0.85), (1.0, -1.4, 0.85), (1.0, -0.9, 0.95), (-1.9, -0.9, 0.95)]
     items: list[Drawable] = [
-        wall([(-4, -2, -2), (4, -2, -2), (4, -2, 1.3), (-4, -2, 1.3)], (188, 196, 200), -9),
+        upright((-4, 4), -2, (-2, 1.3), (188, 196, 200), -9),
         wall([(-4, -2, 1.3), (4, -2, 1.3), (4, 3, 1.3), (-4, 3, 1.3)], (110, 122, 135), -8),
         wall([(-4, 3, -2), (-4, -2, -2), (-4, -2, 1.3), (-4, 3, 1.3)], (170, 178, 184), -8),
-        wall(
-            [(-1.1, -1.99, 0.05), (-0.3, -1.99, 0.05), (-0.3, -1.99, 0.6), (-1.1, -1.99, 0.6)],
-            (150, 105, 70),
-            -7,
-        ),
-        wall([(0.5, -1.9, 0.15), (1.5, -1.9, 0.15), (1.5, -1.9, 1.3), (0.5, -1.9, 1.3)], (96, 108, 128), -7),
-        wall(
-            [(0.55, -1.89, 0.25), (1.45, -1.89, 0.25), (1.45, -1.89, 0.5), (0.55, -1.89, 0.5)],
-            (60, 62, 70),
-            -6,
-        ),
-        wall(
-            [(-1.9, -1.4, 0.85), (1.0, -1.4, 0.85), (1.0, -0.9, 0.95), (-1.9, -0.9, 0.95)],
-            (135, 160, 182),
-            -5,
-        ),
+        upright((-1.1, -0.3), -1.99, (0.05, 0.6), (150, 105, 70), -7),
+        upright((0.5, 1.5), -1.9, (0.15, 1.3), (96, 108, 128), -7),
+        upright((0.55, 1.45), -1.89, (0.25, 0.5), (60, 62, 70), -6),
+        wall(bench, (135, 160, 182), -5),
     ]
     for x, z in ((-0.75, 0.62), (-0.62, 0.72), (-0.84, 0.76)):
         items.append(Sphere(np.array([x, -1.2, z]), 0.11, DULL_GREEN, UP, 0.4, layer=-4))
@@ -312,6 +290,13 @@ def photograph(
         more, less = _sensor_noise(photometry.read_noise, height, width)
         cv2.subtract(cv2.add(image, more[window], image), less[window], image)
     return np.asarray(image, dtype=np.uint8)
+
+
+def photographs(
+    items: Sequence[Drawable], views: Sequence[Viewpoint], photometry: Photometry, rng: np.random.Generator
+) -> list[Image]:
+    """Return the pictures that several cameras take at once, see :func:`photograph`."""
+    return [photograph(items, view, photometry, rng) for view in views]
 
 
 WEBCAM = Photometry(read_noise=3.0, shot_noise=0.0, blur=0.6)

@@ -258,7 +258,7 @@ def test_without_the_correction_of_sh14_the_gripper_closes_far_away():
     parameters = replace(handover.thesis_parameters(0.2), stop_threshold=0.05**0.5)
     controller = HandoverController(parameters)
     rng = np.random.default_rng(0)
-    ball = handover.Scene().ball("front", ARM.tip_points(ARM.home)[3:], rng)
+    ball = handover.HOLDER.ball("front", rng)
     run = handover.run_handover(controller, plant_k(), eyes, ball, rng)
     assert run.mode == "grasp"
     assert not run.success

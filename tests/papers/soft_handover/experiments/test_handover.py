@@ -32,7 +32,7 @@ def test_same_seed_same_runs_whatever_ran_before():
 
 def test_success_is_judged_by_the_true_ball_in_the_true_gripper():
     controller = HandoverController(handover.thesis_parameters(0.2))
-    ball = handover.Scene().ball("front", ARM.tip_points(ARM.home)[3:], np.random.default_rng(0))
+    ball = handover.HOLDER.ball("front", np.random.default_rng(0))
     for offset, caught in ((0.0, True), (0.1, False)):
         change = faults.wrong_calibration(offset)
         eyes = faults.FaultyObserver(EYES, change)
@@ -139,8 +139,8 @@ def test_findings_fill_the_scorecard():
         use_case.use_cases(handover.thesis_parameters(0.4), plant, EYES, 1, 1, plant=name)
         for name, plant in PLANTS.items()
     )
-    bare, _ = variants.without_estimation(PLANTS, EYES, (0.4,), 1, 1, step_limit=30)
-    suggested = improvements.compare_suggestions(PLANTS, {"thesis": EYES}, 1, 1)
+    bare, _ = handover.compare(variants.with_and_without_estimation(0.4), PLANTS, EYES, 1, 1, step_limit=30)
+    suggested, _ = handover.compare(improvements.suggestions(), PLANTS, EYES, 1, 1, step_limit=150)
     tables = findings.HandoverTables(runs, traces, guided, cases, bare, suggested)
     result = findings.findings(tables, {a: timestep(a) for a in (0.1, 0.2, 0.4)})
     card = build_scorecard("soft_handover", result).set_index("id")
@@ -160,7 +160,7 @@ def test_findings_fill_the_scorecard():
 
 
 def test_a_ball_opposite_a_tendon_is_slow_on_the_elastic_arm_only():
-    table = variants.reach_by_heading(PLANTS, laterals=(0.12, 0.17), step_limit=60)
+    table = variants.reach_by_heading(PLANTS, (0.12, 0.17), step_limit=60)
     steps = table.set_index(["plant", "heading_deg", "lateral_mm"])["steps"]
     assert steps["E", 180.0, 170.0] > 2 * steps["E", 0.0, 170.0]
     assert steps["E", 180.0, 120.0] <= steps["E", 0.0, 120.0] + 2
