@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from soro_lib.controllers.handover import UP, HandoverController, HandoverParameters, Mode, goal_over
 from soro_lib.controllers.virtual_stiffness import within_limits
@@ -24,7 +24,7 @@ from soro_lib.papers.soft_handover.experiments.handover import (
     trials,
 )
 from soro_lib.papers.soft_handover.world.observer import Observer
-from soro_lib.papers.soft_handover.world.plant import HelixPlant, HoldingHand
+from soro_lib.papers.soft_handover.world.plant import Array, HelixPlant, HoldingHand
 from soro_lib.poses import magnitude
 from soro_lib.robots.helix_motors import TendonMotors
 from soro_lib.sensing.handover_observation import HandoverObservation
@@ -32,7 +32,7 @@ from soro_lib.sensing.handover_observation import HandoverObservation
 ONSET = 2
 """Step at which a fault sets in."""
 
-Change = Callable[[HandoverObservation, int, np.random.Generator], HandoverObservation]
+Change = Callable[[HandoverObservation, int, Generator], HandoverObservation]
 """What a fault makes of a look, given the step."""
 
 
@@ -54,9 +54,7 @@ class FaultyObserver:
         self.observer.reset()
         self.step = -1
 
-    def observe(
-        self, state: NDArray[np.float64], ball: NDArray[np.float64], rng: np.random.Generator
-    ) -> HandoverObservation:
+    def observe(self, state: Array, ball: Array, rng: Generator) -> HandoverObservation:
         """Return what is seen, spoilt."""
         self.step += 1
         return self.change(self.observer.observe(state, ball, rng), self.step, rng)
@@ -88,7 +86,7 @@ class Fault:
     guide: Guide | None = None
 
 
-Distortion = Callable[[HandoverObservation, np.random.Generator], HandoverObservation]
+Distortion = Callable[[HandoverObservation, Generator], HandoverObservation]
 """What a fault makes of a look in which arm and ball were seen."""
 
 
@@ -100,7 +98,7 @@ def always(distort: Distortion) -> Change:
 def sometimes(share: float, distort: Distortion) -> Change:
     """Distortion a share of the looks."""
 
-    def change(look: HandoverObservation, step: int, rng: np.random.Generator) -> HandoverObservation:
+    def change(look: HandoverObservation, step: int, rng: Generator) -> HandoverObservation:
         spoilt = rng.random() < share and step >= ONSET and saw_all(look)
         return distort(look, rng) if spoilt else look
 
@@ -112,7 +110,7 @@ def saw_all(look: HandoverObservation) -> bool:
     return look.wrist is not None and look.direction is not None and look.ball is not None
 
 
-def hidden_ring(look: HandoverObservation, rng: np.random.Generator) -> HandoverObservation:
+def hidden_ring(look: HandoverObservation, rng: Generator) -> HandoverObservation:
     """Hide the marker ring."""
     return replace(look, wrist=None, direction=None)
 
@@ -126,7 +124,7 @@ def frozen_cameras(steps: int) -> Change:
     """Repeat one look for a number of steps."""
     kept: list[HandoverObservation] = []
 
-    def change(look: HandoverObservation, step: int, rng: np.random.Generator) -> HandoverObservation:
+    def change(look: HandoverObservation, step: int, rng: Generator) -> HandoverObservation:
         if step == ONSET:
             kept[:] = [look]
         return kept[0] if ONSET <= step < ONSET + steps else look
@@ -134,7 +132,7 @@ def frozen_cameras(steps: int) -> Change:
     return change
 
 
-def swapped_cameras(look: HandoverObservation, rng: np.random.Generator) -> HandoverObservation:
+def swapped_cameras(look: HandoverObservation, rng: Generator) -> HandoverObservation:
     """Take the left image for the right one: left and right change sides, rays miss each other."""
     mirror = np.array([-1.0, 1.0, 1.0])
     mirrored = {name: mirror * getattr(look, name) for name in ("wrist", "direction", "ball")}
@@ -147,13 +145,13 @@ def wrong_calibration(offset: float) -> Change:
     return always(lambda look, rng: replace(look, wrist=look.wrist + depth, ball=look.ball - depth))
 
 
-def not_a_number(look: HandoverObservation, rng: np.random.Generator) -> HandoverObservation:
+def not_a_number(look: HandoverObservation, rng: Generator) -> HandoverObservation:
     """Return NaN."""
     nothing = np.full(3, np.nan)
     return replace(look, wrist=nothing, direction=nothing, ball=nothing)
 
 
-def flipped_markers(look: HandoverObservation, rng: np.random.Generator) -> HandoverObservation:
+def flipped_markers(look: HandoverObservation, rng: Generator) -> HandoverObservation:
     """Turn the gripper's direction by 60 degrees and throw the wrist 8 cm off."""
     aside = rng.standard_normal(3)
     aside -= np.sum(aside * look.direction) * look.direction
@@ -162,7 +160,7 @@ def flipped_markers(look: HandoverObservation, rng: np.random.Generator) -> Hand
     return replace(look, direction=direction, wrist=look.wrist + 0.08 * aside)
 
 
-def second_ball(look: HandoverObservation, rng: np.random.Generator) -> HandoverObservation:
+def second_ball(look: HandoverObservation, rng: Generator) -> HandoverObservation:
     """Take another green thing, 30 cm aside, for the ball."""
     return replace(look, ball=look.ball + np.array([0.30, 0.0, 0.0]))
 
@@ -170,7 +168,7 @@ def second_ball(look: HandoverObservation, rng: np.random.Generator) -> Handover
 def noise_times(factor: float) -> Change:
     """Add noise of a multiple of what the look claims."""
 
-    def distort(look: HandoverObservation, rng: np.random.Generator) -> HandoverObservation:
+    def distort(look: HandoverObservation, rng: Generator) -> HandoverObservation:
         extra = factor * rng.standard_normal((3, 3))
         direction = look.direction + look.direction_deviation * extra[1]
         return replace(
@@ -186,7 +184,7 @@ def noise_times(factor: float) -> Change:
 def pushed_away(distance: float, gripper_length: float = 0.10) -> Guide:
     """Hold the arm a distance [m] away from the ball for ten steps."""
 
-    def guide(step: int, gripper: NDArray[np.float64], ball: NDArray[np.float64]) -> HoldingHand | None:
+    def guide(step: int, gripper: Array, ball: Array) -> HoldingHand | None:
         if not ONSET <= step < ONSET + 10:
             return None
         away = (gripper - ball) * np.array([1.0, 1.0, 0.0])

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soro_lib.controllers.handover import goal_over
-from soro_lib.papers.soft_handover.world.plant import HoldingHand
+from soro_lib.papers.soft_handover.world.plant import Array, HoldingHand
 
 
 @dataclass
@@ -36,9 +35,7 @@ class GuidingHand:
     stiffness: float = 200.0
     gripper_length: float = 0.10
 
-    def __call__(
-        self, step: int, gripper: NDArray[np.float64], ball: NDArray[np.float64]
-    ) -> HoldingHand | None:
+    def __call__(self, step: int, gripper: Array, ball: Array) -> HoldingHand | None:
         """Return the pull of the hand, given step, true gripper (3,) and ball (3,) [m]."""
         if step < self.first_step:
             self._over = True

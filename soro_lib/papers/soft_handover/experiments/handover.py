@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from soro_lib.controllers.handover import UP, HandoverCommand, HandoverController, HandoverParameters, Mode
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
 from soro_lib.papers.soft_handover.world.observer import NO_NOISE, NoisyObserver, Observer
-from soro_lib.papers.soft_handover.world.plant import Gripper, HelixPlant, HoldingHand
+from soro_lib.papers.soft_handover.world.plant import Array, Gripper, HelixPlant, HoldingHand
 from soro_lib.robots.helix import HelixArm
 from soro_lib.robots.helix_kernels import tip_points
 
@@ -32,7 +32,7 @@ OPENINGS_MM = (20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 60.0)
 """Distances from the gripper point within which a ball may be caught [mm]."""
 
 
-def beside_the_gripper(heading: float, lateral: float, height: float) -> NDArray[np.float64]:
+def beside_the_gripper(heading: float, lateral: float, height: float) -> Array:
     """Return the point (3,) [m] in a direction [deg] from the calibrated gripper, sideways and up [m]."""
     angle = np.deg2rad(heading)
     return CALIBRATED_GRIPPER + (lateral * np.array([np.cos(angle), np.sin(angle), 0.0]) + height * UP)
@@ -63,12 +63,12 @@ class BallHolder:
     sway: float = 0.002
     sway_memory: float = 0.5
 
-    def ball(self, location: str, rng: np.random.Generator) -> NDArray[np.float64]:
+    def ball(self, location: str, rng: Generator) -> Array:
         """Return where the hand holds the ball (3,) [m]."""
         place = beside_the_gripper(self.headings[location], self.lateral, self.height)
         return place + self.placement_deviation * rng.standard_normal(3)
 
-    def sways(self, rng: np.random.Generator) -> Iterator[NDArray[np.float64]]:
+    def sways(self, rng: Generator) -> Iterator[Array]:
         """Yield where the hand has swayed to (3,) [m], look by look."""
         sway = np.zeros(3)
         fresh = self.sway * np.sqrt(1 - self.sway_memory**2)
@@ -109,7 +109,11 @@ class HandoverRun:
     tendon_changes : ndarray, shape (steps + 1, 9)
         What the motors were told [m].
     trace : dict of str to ndarray
-        One entry per step; see `TRACE_COLUMNS`.
+        One entry per step. ``error_mm``, to the goal, six numbers together; for the gripper point,
+        ``measured_mm``, ``commanded_mm`` (``q_sys``), ``estimated_mm`` (``q_est``) and ``true_mm`` from the
+        calibrated place, ``commanded_gap_mm`` and ``estimated_gap_mm`` from the measured one, ``miss_mm``
+        from the true ball; ``estimate_residual_mm`` of the state optimisation, six numbers together;
+        ``descending``, 1 in the second stage.
     """
 
     steps: int
@@ -118,33 +122,16 @@ class HandoverRun:
     success: bool
     miss: float
     lateral_overshoot: float
-    state: NDArray[np.float64]
-    ball: NDArray[np.float64]
-    states: NDArray[np.float64]
-    commands: NDArray[np.float64]
-    estimates: NDArray[np.float64]
-    tendon_changes: NDArray[np.float64]
-    trace: dict[str, NDArray[np.float64]]
+    state: Array
+    ball: Array
+    states: Array
+    commands: Array
+    estimates: Array
+    tendon_changes: Array
+    trace: dict[str, Array]
 
 
-TRACE_COLUMNS = (
-    "error_mm",
-    "measured_mm",
-    "commanded_mm",
-    "commanded_gap_mm",
-    "estimated_mm",
-    "estimated_gap_mm",
-    "estimate_residual_mm",
-    "miss_mm",
-    "true_mm",
-    "descending",
-)
-"""Error to the goal (six numbers together); then, for the gripper point: distance of the measured, commanded
-(``q_sys``) and estimated (``q_est``) one from the calibrated place, gaps of the last two to the measured
-one; residual of the state optimisation (six numbers together); distance of the true gripper from the true
-ball."""
-
-Guide = Callable[[int, NDArray[np.float64], NDArray[np.float64]], HoldingHand | None]
+Guide = Callable[[int, Array, Array], HoldingHand | None]
 """A human's hand on the arm: from step, true gripper (3,) and ball (3,) to the pull."""
 
 
@@ -152,8 +139,8 @@ def run_handover(
     controller: HandoverController,
     plant: HelixPlant,
     observer: Observer,
-    ball: NDArray[np.float64],
-    rng: np.random.Generator,
+    ball: Array,
+    rng: Generator,
     *,
     holder: BallHolder = HOLDER,
     guide: Guide | None = None,
@@ -208,8 +195,8 @@ def still_handover(
 class Moment(NamedTuple):
     """True state (9,), true ball (3,) [m] and the command that followed from seeing them."""
 
-    state: NDArray[np.float64]
-    ball: NDArray[np.float64]
+    state: Array
+    ball: Array
     command: HandoverCommand
 
 
@@ -224,7 +211,7 @@ def judged(looks: Sequence[Moment], arm: HelixArm) -> HandoverRun:
     true, commanded = arm.tip_points(states)[:, 3:], arm.tip_points(q_sys)[:, 3:]
     estimated = np.where(np.isnan(q_est[:, :3]), np.nan, arm.tip_points(np.nan_to_num(q_est))[:, 3:])
 
-    def apart(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    def apart(first: Array, second: Array) -> Array:
         return 1e3 * np.linalg.norm(first - second, axis=1)
 
     trace = {
@@ -259,7 +246,7 @@ def judged(looks: Sequence[Moment], arm: HelixArm) -> HandoverRun:
     )
 
 
-Trial = tuple[dict[str, object], NDArray[np.float64], np.random.Generator]
+Trial = tuple[dict[str, object], Array, Generator]
 """Block, number and location of a run, where the ball is (3,) [m], and the run's random numbers."""
 
 
@@ -306,7 +293,7 @@ def handovers(
     runs : DataFrame
         One row per run: labels, block, run, location, steps, closed, success, miss_mm, overshoot_mm, reason.
     traces : DataFrame
-        One row per step: labels, block, run, step and `TRACE_COLUMNS`.
+        One row per step: labels, block, run, step and what :class:`HandoverRun` traces.
     """
     controller = HandoverController(parameters)
     runs, traces = [], []
@@ -349,7 +336,7 @@ def compare(
     The balls, the noise and the hands are the same under all; `options` go to :func:`handovers`.
     """
     tables = [
-        handovers(parameters, plant, observer, repetitions, seed, plant=name, **labels, **options)
+        handovers(parameters, plant, observer, repetitions, seed, plant=name, **options, **labels)
         for name, plant in plants.items()
         for labels, parameters in settings
     ]

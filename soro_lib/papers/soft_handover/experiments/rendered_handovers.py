@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 
 from soro_lib.papers.soft_handover.beyond import best_controller
-from soro_lib.papers.soft_handover.experiments.handover import Settings, handovers, thesis_parameters
-from soro_lib.papers.soft_handover.experiments.vision import Report, nothing
+from soro_lib.papers.soft_handover.experiments.handover import Settings, compare, thesis_parameters
 from soro_lib.papers.soft_handover.world.observer import RenderedObserver, calibrate_on_box
 from soro_lib.papers.soft_handover.world.plant import HelixPlant
 from soro_lib.papers.soft_handover.world.scene import STEREO
@@ -29,13 +28,7 @@ CONTROLLERS: Settings = [
 
 
 def rendered_block(
-    plant_name: str,
-    plant: HelixPlant,
-    estimator: str,
-    block: int,
-    seed: int,
-    settings: Settings = CONTROLLERS,
-    report: Report = nothing,
+    plant_name: str, plant: HelixPlant, estimator: str, block: int, seed: int, settings: Settings
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Return runs and traces of one block: eight runs of every controller, seen through one calibration.
 
@@ -50,7 +43,6 @@ def rendered_block(
     seed : int
     settings : sequence
         The controllers.
-    report : callable
 
     Returns
     -------
@@ -62,12 +54,8 @@ def rendered_block(
     cameras = calibrate_on_box(STEREO, np.random.default_rng(selection))
     observer = RenderedObserver(HandoverVision(cameras, estimator))
     place_seed = int(places.generate_state(1)[0])
-    tables = []
-    for labels, parameters in settings:
-        labels = {"plant": plant_name, "estimator": estimator, **labels}
-        tables.append(handovers(parameters, plant, observer, 1, place_seed, **labels))
-        report(len(tables[-1][1]))
-    runs, traces = (pd.concat(parts, ignore_index=True).assign(block=block) for parts in zip(*tables))
+    tables = compare(settings, {plant_name: plant}, observer, 1, place_seed, estimator=estimator)
+    runs, traces = (table.assign(block=block) for table in tables)
     return runs, traces
 
 

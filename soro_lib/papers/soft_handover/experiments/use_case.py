@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from soro_lib.controllers.handover import HandoverController, HandoverParameters, Mode
 from soro_lib.papers.soft_handover.experiments.handover import (
@@ -15,7 +15,7 @@ from soro_lib.papers.soft_handover.experiments.handover import (
     trials,
 )
 from soro_lib.papers.soft_handover.world.observer import Observer
-from soro_lib.papers.soft_handover.world.plant import HelixPlant
+from soro_lib.papers.soft_handover.world.plant import Array, HelixPlant
 
 
 @dataclass(frozen=True)
@@ -42,15 +42,15 @@ class Bowl:
     ball_mass: float = 0.03
 
     @property
-    def release_point(self) -> NDArray[np.float64]:
+    def release_point(self) -> Array:
         """Gripper point (3,) [m] over the bowl."""
         return beside_the_gripper(self.heading, self.lateral, self.height)
 
-    def off_centre(self, ball: NDArray[np.float64]) -> float:
+    def off_centre(self, ball: Array) -> float:
         """Return the horizontal distance of a ball (3,) from the middle of the bowl [m]."""
         return float(np.linalg.norm((ball - self.release_point)[:2]))
 
-    def catches(self, ball: NDArray[np.float64]) -> bool:
+    def catches(self, ball: Array) -> bool:
         """Return whether a ball (3,) let go falls in."""
         return self.off_centre(ball) <= self.radius - self.ball_radius
 
@@ -73,8 +73,8 @@ class Carry:
     dropped: bool
     steps: int
     miss: float
-    states: NDArray[np.float64]
-    commands: NDArray[np.float64]
+    states: Array
+    commands: Array
 
 
 def carry_and_drop(
@@ -83,7 +83,7 @@ def carry_and_drop(
     observer: Observer,
     bowl: Bowl,
     handover: HandoverRun,
-    rng: np.random.Generator,
+    rng: Generator,
     step_limit: int = 300,
 ) -> Carry:
     """Carry a ball that was taken to the bowl and let it go there."""

@@ -4,22 +4,17 @@ Poses are drawn at random where handovers happen; images are rendered and detect
 tables are tidy, errors in mm and degrees in the frame `arm_base` (y is the cameras' depth).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from soro_lib.papers.soft_handover.world.observer import calibrate_on_box
-from soro_lib.papers.soft_handover.world.scene import (
-    SIDE_CAMERA,
-    STEREO,
-    WEBCAM,
-    HandoverScene,
-    Viewpoint,
-    photographs,
-)
+from soro_lib.papers.soft_handover.world.plant import Array
+from soro_lib.papers.soft_handover.world.scene import SIDE_CAMERA, STEREO, WEBCAM, HandoverScene, photographs
 from soro_lib.project import data_directory
 from soro_lib.replication.datacards import verified
 from soro_lib.replication.findings import Finding
@@ -35,9 +30,6 @@ SCENE = HandoverScene()
 SEED = 7
 """Seed of the recordings."""
 
-Report = Callable[[int], None]
-"""Told how many more pictures have been looked at."""
-
 HIDDEN = 0.85
 """Visible share below which a ball counts as partly hidden."""
 
@@ -52,14 +44,10 @@ def recorded(name: str) -> pd.DataFrame:
     return pd.read_csv(verified(data_directory("soft_handover") / f"{name}.csv.gz"))
 
 
-def nothing(pictures: int) -> None:
-    """Report to nobody."""
-
-
-def random_states(count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def random_states(count: int, rng: Generator) -> Array:
     """Return true states (count, 9) that put the gripper where handovers happen."""
     arm = SCENE.arm
-    kept: list[NDArray[np.float64]] = []
+    kept: list[Array] = []
     while len(kept) < count:
         states = np.tile(arm.home.reshape(3, 3), (200, 1, 1))
         states[:, :, :2] += rng.normal(0.0, [[0.2], [0.4], [0.4]], (200, 3, 2))
@@ -73,22 +61,20 @@ def random_states(count: int, rng: np.random.Generator) -> NDArray[np.float64]:
     return np.array(kept[:count])
 
 
-def ball_before(gripper: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+def ball_before(gripper: Array, rng: Generator) -> Array:
     """Return a ball (3,) [m] below and beside the gripper point, as during an approach."""
     return gripper + rng.uniform([-0.08, -0.08, 0.05], [0.08, 0.08, 0.12])
 
 
-def approach(rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def approach(rng: Generator) -> tuple[Array, Array]:
     """Return a random true state (9,) and a ball (3,) [m] before its gripper."""
     state = random_states(1, rng)[0]
     return state, ball_before(SCENE.arm.tip_points(state)[3:], rng)
 
 
-def poses(count: int, seed: int, report: Report) -> Iterator[tuple[int, np.random.Generator]]:
+def poses(count: int, seed: int) -> Iterator[tuple[int, Generator]]:
     """Yield the number of each random pose and its random numbers, the same however many poses follow."""
-    for pose, sequence in enumerate(np.random.SeedSequence(seed).spawn(count)):
-        yield pose, np.random.default_rng(sequence)
-        report(1)
+    return enumerate(map(np.random.default_rng, np.random.SeedSequence(seed).spawn(count)))
 
 
 @dataclass(frozen=True)
@@ -98,7 +84,7 @@ class Condition:
     Attributes
     ----------
     name : str
-    views : sequence of Viewpoint
+    views : sequence of CalibratedCamera
         The cameras.
     selection_deviation : float
         With which the corners of the calibration box are selected [px].
@@ -110,7 +96,7 @@ class Condition:
     """
 
     name: str
-    views: Sequence[Viewpoint] = STEREO
+    views: Sequence[CalibratedCamera] = STEREO
     selection_deviation: float = 0.5
     photometry: Photometry = WEBCAM
     corner_shift: float = CORNER_SHIFT
@@ -130,9 +116,7 @@ CAUSES = (
 """The conditions of the error budget."""
 
 
-def accuracy(
-    count: int, seed: int, conditions: Sequence[Condition] = CAUSES, report: Report = nothing
-) -> pd.DataFrame:
+def accuracy(count: int, seed: int, conditions: Sequence[Condition] = CAUSES) -> pd.DataFrame:
     """Return the errors of every estimator at random poses under every condition.
 
     All conditions see the same poses, and are calibrated with the same selection errors scaled.
@@ -143,7 +127,6 @@ def accuracy(
         Number of poses.
     seed : int
     conditions : sequence of Condition
-    report : callable
 
     Returns
     -------
@@ -153,7 +136,7 @@ def accuracy(
         ball_{x,y,z}_mm, ball_mm, gap_mm.
     """
     rows = []
-    for pose, rng in poses(count, seed, report):
+    for pose, rng in poses(count, seed):
         state, ball = approach(rng)
         items = SCENE.items(state, ball)
         picture_seed, selection_seed = rng.bit_generator.seed_seq.spawn(2)  # type: ignore[attr-defined]
@@ -178,8 +161,8 @@ def accuracy(
 
 
 def true_candidates(
-    look: Look, cameras: Sequence[CalibratedCamera], state: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    look: Look, cameras: Sequence[CalibratedCamera], state: Array
+) -> tuple[Array, NDArray[np.bool_]]:
     """Return the poses of all markers, the one nearer to the truth first (m, 2, 4, 4), and which of them
     OpenCV had second (m,)."""
     sights = [wrist_candidates(m, c, SCENE.ring) for c, m in zip(cameras, look.markers) if m]
@@ -191,10 +174,7 @@ def true_candidates(
 
 
 def look_errors(
-    state: NDArray[np.float64],
-    ball: NDArray[np.float64],
-    seen: HandoverObservation,
-    wrist: WristPose | HandoverObservation | None,
+    state: Array, ball: Array, seen: HandoverObservation, wrist: WristPose | HandoverObservation | None
 ) -> dict[str, float]:
     """Return all errors of one look against the truth, NaN where nothing was seen."""
     missing = np.full(3, np.nan)
@@ -231,7 +211,7 @@ def error_budget(table: pd.DataFrame) -> pd.DataFrame:
     return budget.reset_index()
 
 
-def still_looks(count: int, seed: int, report: Report = nothing, looks: int = 8) -> pd.DataFrame:
+def still_looks(count: int, seed: int, looks: int = 8) -> pd.DataFrame:
     """Return the errors of repeated looks at still arms, each pose with its own calibration.
 
     What changes from look to look is jitter, what stays is bias.
@@ -244,7 +224,7 @@ def still_looks(count: int, seed: int, report: Report = nothing, looks: int = 8)
     """
     views = (*STEREO, SIDE_CAMERA)
     rows = []
-    for pose, rng in poses(count, seed, report):
+    for pose, rng in poses(count, seed):
         state, ball = approach(rng)
         cameras = calibrate_on_box(views, rng)
         systems = {name: HandoverVision(cameras[:2], name, track=False) for name in ESTIMATORS}

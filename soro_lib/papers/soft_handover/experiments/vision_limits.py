@@ -9,30 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.random import Generator
 from numpy.typing import NDArray
 
-from soro_lib.papers.soft_handover.experiments.vision import (
-    NO_SENSOR_NOISE,
-    SCENE,
-    Report,
-    approach,
-    ball_before,
-    look_errors,
-    nothing,
-    poses,
-    random_states,
-)
+from soro_lib.papers.soft_handover.experiments import vision
+from soro_lib.papers.soft_handover.experiments.vision import SCENE
+from soro_lib.papers.soft_handover.world import scene
 from soro_lib.papers.soft_handover.world.observer import calibrate_on_box
-from soro_lib.papers.soft_handover.world.scene import (
-    BRIO,
-    STEREO,
-    WEBCAM,
-    Extras,
-    Viewpoint,
-    photograph,
-    photographs,
-    stereo_pair,
-)
+from soro_lib.papers.soft_handover.world.plant import Array
+from soro_lib.papers.soft_handover.world.scene import STEREO, WEBCAM, Extras, photographs
 from soro_lib.sensing.camera import Image, invert_pose, transform_points
 from soro_lib.sensing.handover_vision import ESTIMATORS, HandoverVision
 from soro_lib.sensing.stereo_vision import CalibratedCamera
@@ -41,7 +26,7 @@ BALL_RULES = {"largest piece": "thesis", "joined pieces": "joint"}
 """How a hidden ball is measured, and the estimator that does it so."""
 
 
-def occlusion(count: int, seed: int, report: Report = nothing) -> pd.DataFrame:
+def occlusion(count: int, seed: int) -> pd.DataFrame:
     """Return how well a ball between the fingers is located, against how much of it can be seen (Fig. 15).
 
     Half of the balls lie between the open fingers (10 mm per axis off the gripper point), half farther below.
@@ -53,11 +38,11 @@ def occlusion(count: int, seed: int, report: Report = nothing) -> pd.DataFrame:
         claimed_mm.
     """
     rows = []
-    for pose, rng in poses(count, seed, report):
+    for pose, rng in vision.poses(count, seed):
         case = hidden_ball(pose, rng)
         for rule, estimator in BALL_RULES.items():
             seen = HandoverVision(case.cameras, estimator, track=False).look(case.pictures).observation
-            errors = look_errors(case.state, case.ball, seen, None)
+            errors = vision.look_errors(case.state, case.ball, seen, None)
             ball = {name: errors[name] for name in ("ball_x_mm", "ball_y_mm", "ball_z_mm", "ball_mm")}
             claims = {"gap_mm": 1e3 * seen.disagreement, "claimed_mm": 1e3 * seen.ball_deviation}
             rows.append({"pose": pose, "rule": rule, "visible": case.visible, **ball, **claims})
@@ -77,18 +62,18 @@ class HiddenBall(NamedTuple):
         Visible share, the smaller of the cameras.
     """
 
-    state: NDArray[np.float64]
-    ball: NDArray[np.float64]
+    state: Array
+    ball: Array
     cameras: list[CalibratedCamera]
     pictures: list[Image]
     visible: float
 
 
-def hidden_ball(pose: int, rng: np.random.Generator) -> HiddenBall:
+def hidden_ball(pose: int, rng: Generator) -> HiddenBall:
     """Return one of the balls of :func:`occlusion`; every odd one lies between the fingers."""
-    state = random_states(1, rng)[0]
+    state = vision.random_states(1, rng)[0]
     gripper = SCENE.arm.tip_points(state)[3:]
-    ball = gripper + 0.010 * rng.standard_normal(3) if pose % 2 else ball_before(gripper, rng)
+    ball = gripper + 0.010 * rng.standard_normal(3) if pose % 2 else vision.ball_before(gripper, rng)
     cameras = calibrate_on_box(STEREO, rng)
     pictures = photographs(SCENE.items(state, ball), STEREO, WEBCAM, rng)
     visible = min(visible_share(state, ball, view) for view in STEREO)
@@ -100,12 +85,12 @@ def stored_hidden_ball(pose: int, seed: int) -> HiddenBall:
     return hidden_ball(pose, np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(pose,))))
 
 
-def visible_share(state: NDArray[np.float64], ball: NDArray[np.float64], view: Viewpoint) -> float:
+def visible_share(state: Array, ball: Array, view: CalibratedCamera) -> float:
     """Return the share of the ball's pixels that a camera sees, counted in pictures with and without the
     rest."""
-    still, clean = np.random.default_rng(0), replace(NO_SENSOR_NOISE, blur=0.0)
+    still, clean = np.random.default_rng(0), replace(vision.NO_SENSOR_NOISE, blur=0.0)
     empty, alone, together = (
-        photograph(items, view, clean, still).astype(int)
+        scene.photograph(items, view, clean, still).astype(int)
         for items in ([], [SCENE.ball(ball)], SCENE.items(state, ball))
     )
     of_ball = np.abs(alone - empty).max(axis=-1) > 0
@@ -121,7 +106,7 @@ TOE_IN = {"parallel": 0.0, "half toed in": 0.5, "aimed at the arm": 1.0}
 
 
 def workspace(
-    toe_in: float = 0.5, focal_length: float = BRIO.focal_length, step: float = 0.02
+    toe_in: float = 0.5, focal_length: float = scene.BRIO.focal_length, step: float = 0.02
 ) -> pd.DataFrame:
     """Return which cameras see ring and ball, for every place of the gripper on a grid (Fig. 14).
 
@@ -133,17 +118,17 @@ def workspace(
     DataFrame
         x_mm, y_mm, z_mm (gripper point in `arm_base`), left, right (whether each camera sees it).
     """
-    camera = replace(BRIO, focal_length=focal_length)
+    camera = replace(scene.BRIO, focal_length=focal_length)
     axes = np.arange(-0.80, 0.801, step), (-0.2, 0.0, 0.2), np.arange(0.30, 1.001, step)
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     sides = [(x, 0.0, z) for x in (-0.03, 0.03) for z in (-0.115, 0.02)]
     columns = {f"{axis}_mm": 1e3 * values for axis, values in zip("xyz", grid.T)}
-    for name, view in zip(("left", "right"), stereo_pair(toe_in=toe_in, camera=camera)):
+    for name, view in zip(("left", "right"), scene.stereo_pair(toe_in=toe_in, camera=camera)):
         columns[name] = np.logical_and.reduce([in_picture(view, grid + side) for side in sides])
     return pd.DataFrame(columns)
 
 
-def in_picture(view: Viewpoint, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def in_picture(view: CalibratedCamera, points: Array) -> NDArray[np.bool_]:
     """Return for every point (n, 3) [m] whether it lies in a camera's picture."""
     seen = transform_points(invert_pose(view.pose), points)
     ahead = (seen[:, 2] > 0.1) & (np.hypot(*seen[:, :2].T) < view.camera.reach * seen[:, 2])
@@ -199,7 +184,7 @@ DEGRADATIONS = {
 """Pictures worse than ordinary: blur of lens and movement, light, noise [grey levels]."""
 
 
-def degradations(count: int, seed: int, report: Report = nothing) -> pd.DataFrame:
+def degradations(count: int, seed: int) -> pd.DataFrame:
     """Return how well arm and ball are located in bad pictures, the same poses in all.
 
     Returns
@@ -208,8 +193,8 @@ def degradations(count: int, seed: int, report: Report = nothing) -> pd.DataFram
         degradation, estimator, pose, markers, gripper_mm, ball_mm (NaN where not found).
     """
     rows = []
-    for pose, rng in poses(count, seed, report):
-        state, ball = approach(rng)
+    for pose, rng in vision.poses(count, seed):
+        state, ball = vision.approach(rng)
         cameras = calibrate_on_box(STEREO, rng)
         items = SCENE.items(state, ball)
         for name, photometry in DEGRADATIONS.items():
@@ -217,7 +202,7 @@ def degradations(count: int, seed: int, report: Report = nothing) -> pd.DataFram
             for estimator in ESTIMATORS:
                 look = HandoverVision(cameras, estimator, track=False).look(pictures)
                 row = {"degradation": name, "estimator": estimator, "pose": pose}
-                errors = look_errors(state, ball, look.observation, look.observation)
+                errors = vision.look_errors(state, ball, look.observation, look.observation)
                 row |= {"markers": sum(map(len, look.markers))}
                 rows.append(row | {what: errors[what] for what in ("gripper_mm", "ball_mm")})
     return pd.DataFrame(rows)
@@ -259,7 +244,7 @@ LOCATED = 15.0
 """Largest error of a gripper or ball that counts as located [mm]."""
 
 
-def image_faults(count: int, seed: int, report: Report = nothing) -> pd.DataFrame:
+def image_faults(count: int, seed: int) -> pd.DataFrame:
     """Return what becomes of arm and ball under every fault, in the second of two looks 30 mm apart.
 
     Returns
@@ -268,29 +253,27 @@ def image_faults(count: int, seed: int, report: Report = nothing) -> pd.DataFram
         fault, estimator, pose, gripper, ball ("located" within 15 mm, "refused", "wrong"), status.
     """
     rows = []
-    for pose, rng in poses(count, seed, report):
+    for pose, rng in vision.poses(count, seed):
         before, now = moved_apart(rng)
-        ball = ball_before(SCENE.arm.tip_points(now)[3:], rng)
+        ball = vision.ball_before(SCENE.arm.tip_points(now)[3:], rng)
         cameras = calibrate_on_box(STEREO, rng)
         for fault in IMAGE_FAULTS:
             first = photographs(SCENE.items(before, ball), STEREO, WEBCAM, rng)
             second = photographs(SCENE.items(now, ball, fault.extras), STEREO, WEBCAM, rng)
             for estimator in ESTIMATORS:
-                vision = HandoverVision(cameras, estimator)
-                vision.look(first)
-                seen = vision.look(fault.spoil(second, first)).observation
-                errors = look_errors(now, ball, seen, seen)
+                eyes = HandoverVision(cameras, estimator)
+                eyes.look(first)
+                seen = eyes.look(fault.spoil(second, first)).observation
+                errors = vision.look_errors(now, ball, seen, seen)
                 row = {"fault": fault.name, "estimator": estimator, "pose": pose}
                 row |= {what: verdict(errors[f"{what}_mm"]) for what in ("gripper", "ball")}
                 rows.append({**row, "status": seen.status})
     return pd.DataFrame(rows)
 
 
-def moved_apart(
-    rng: np.random.Generator, distance: float = 0.03
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def moved_apart(rng: Generator, distance: float = 0.03) -> tuple[Array, Array]:
     """Return two true states (9,) whose grippers are about a distance [m] apart."""
-    state, direction = random_states(1, rng)[0], 0.05 * rng.standard_normal(9)
+    state, direction = vision.random_states(1, rng)[0], 0.05 * rng.standard_normal(9)
     direction[2::3] = 0.0
     move = np.linalg.norm(SCENE.arm.tip_points(state + direction)[3:] - SCENE.arm.tip_points(state)[3:])
     return state, state + direction * distance / move

@@ -4,7 +4,7 @@ Lengths in mm, times in seconds of the thesis's timestep where they stand beside
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from soro_lib.arcs import backbone
 from soro_lib.papers.soft_handover.experiments.handover import HandoverRun
 from soro_lib.papers.soft_handover.experiments.use_case import Carry
+from soro_lib.papers.soft_handover.world.plant import Array
 from soro_lib.replication.plotting import (
     COLORS,
     ESTIMATE,
@@ -47,8 +48,6 @@ GREY_THRESHOLD: dict[str, Any] = {**THRESHOLD, "color": COLORS["grey"]}
 BOWL = np.array([(-80, 0), (-60, -50), (60, -50), (80, 0)])
 """The outline of the bowl around the middle of its opening [mm]."""
 
-ERROR = "error to the goal [mm]"
-
 OUTCOME_COLORS = {
     "handover": COLORS["green"],
     "safe stop": COLORS["sky"],
@@ -58,7 +57,7 @@ OUTCOME_COLORS = {
 """What a run came to."""
 
 
-def side_view(points: NDArray[np.float64], heading: NDArray[np.float64]) -> NDArray[np.float64]:
+def side_view(points: Array, heading: Array) -> Array:
     """Return points (n, 3) of `arm_base` seen from the side: along a horizontal heading (2,) and up, in mm
     (n, 2)."""
     upright = 1e3 * origin_from_arm_base(points)
@@ -66,26 +65,25 @@ def side_view(points: NDArray[np.float64], heading: NDArray[np.float64]) -> NDAr
     return np.column_stack([along, upright[:, 2]])
 
 
-def draw_arm(
-    axes: Any,
-    arm: HelixArm,
-    state: NDArray[np.float64],
-    heading: NDArray[np.float64],
-    style: Mapping[str, Any],
-    label: str,
+SHAPES = {"commanded": COMMANDED, "estimated": ESTIMATE, "true": TRUTH}
+"""How the shapes of the arm are drawn, from behind to the front."""
+
+
+def draw_moment(
+    axes: Any, arm: HelixArm, heading: Array, states: Mapping[str, Array], ball: Array, size: float
 ) -> None:
-    """Draw backbone, gripper and joints of a state (9,), seen from the side."""
-    segments = state.reshape(3, 3)
-    line = np.concatenate([backbone(segments, 20), arm.tip_points(state)[None, 3:]])
-    joints = np.stack([backbone(segments[: i + 1], 2)[-1] for i in range(3)])
-    axes.plot(*side_view(line, heading).T, **style, label=label)
-    axes.plot(*side_view(joints, heading).T, linestyle="none", marker="o", markersize=3, color=style["color"])
-
-
-def draw_ball(axes: Any, ball: NDArray[np.float64], heading: NDArray[np.float64], size: float) -> None:
-    """Draw a ball (3,) [m], seen from the side."""
-    place = side_view(ball[None], heading)
-    axes.plot(*place.T, linestyle="none", marker="o", markersize=size, color=COLORS["green"], label="ball")
+    """Draw backbone, gripper and joints of the states (9,) that are known, and a ball (3,), from the side."""
+    for name, style in SHAPES.items():
+        if name in states and np.isfinite(states[name]).all():
+            segments = states[name].reshape(3, 3)
+            line = np.concatenate([backbone(segments, 20), arm.tip_points(states[name])[None, 3:]])
+            joints = np.stack([backbone(segments[: i + 1], 2)[-1] for i in range(3)])
+            axes.plot(*side_view(line, heading).T, **style, label=name)
+            dots = {"linestyle": "none", "marker": "o", "markersize": 3, "color": style["color"]}
+            axes.plot(*side_view(joints, heading).T, **dots)
+    dot = {"linestyle": "none", "marker": "o", "markersize": size, "color": COLORS["green"]}
+    axes.plot(*side_view(ball[None], heading).T, **dot, label="ball")
+    axes.set_aspect("equal")
 
 
 def evolution(arm: HelixArm, run: HandoverRun, moments: Mapping[str, int]) -> Figure:
@@ -100,38 +98,28 @@ def evolution(arm: HelixArm, run: HandoverRun, moments: Mapping[str, int]) -> Fi
     """
     figure, panels = new_figure(PAGE_WIDTH, 4.2, 1, len(moments), sharey=True, sharex=True)
     heading = run.ball[:2] / np.linalg.norm(run.ball[:2])
+    shapes = {"commanded": run.commands, "estimated": run.estimates, "true": run.states}
     for axes, (title, step) in zip(panels, moments.items()):
-        draw_arm(axes, arm, run.commands[step], heading, COMMANDED, "commanded")
-        if np.isfinite(run.estimates[step]).all():
-            draw_arm(axes, arm, run.estimates[step], heading, ESTIMATE, "estimated")
-        draw_arm(axes, arm, run.states[step], heading, TRUTH, "true")
-        draw_ball(axes, run.ball, heading, 9)
-        axes.set_aspect("equal")
+        states = {name: shape[step] for name, shape in shapes.items()}
+        draw_moment(axes, arm, heading, states, run.ball, 9)
         label_axes(axes, "towards the ball [mm]", title=f"{title} (step {step})")
     label_axes(panels[0], y="up [mm]")
     legend(figure)
     return figure
 
 
-def fig13_use_case(arm: HelixArm, run: HandoverRun, carry: Carry, release: NDArray[np.float64]) -> Figure:
+def fig13_use_case(arm: HelixArm, run: HandoverRun, carry: Carry, release: Array) -> Figure:
     """Draw the arm as it takes the ball, carries it and lets it go over the bowl, seen along y (Fig. 13)."""
     figure, panels = new_figure(PAGE_WIDTH, 4.0, 1, 4, sharey=True, sharex=True)
     heading = np.array([1.0, 0.0])
-    moments = {
-        "start": (run.states[0], run.commands[0]),
-        "taken": (run.states[-1], run.commands[-1]),
-        "on the way": (carry.states[carry.steps // 3], carry.commands[carry.steps // 3]),
-        "let go": (carry.states[-1], carry.commands[-1]),
-    }
     in_gripper = run.ball - arm.tip_points(run.state)[3:]
     bowl = side_view(release[None] + [0, 0, 0.08], heading) + BOWL
-    for axes, (title, (state, command)) in zip(panels, moments.items()):
-        held = run.ball if title == "start" else arm.tip_points(state)[3:] + in_gripper
-        draw_arm(axes, arm, command, heading, COMMANDED, "commanded")
-        draw_arm(axes, arm, state, heading, TRUTH, "true")
-        draw_ball(axes, held, heading, 7)
+    moments = {"start": (run, 0), "taken": (run, -1), "on the way": (carry, carry.steps // 3)}
+    for axes, (title, (part, step)) in zip(panels, [*moments.items(), ("let go", (carry, -1))]):
+        state = part.states[step]
+        ball = run.ball if title == "start" else arm.tip_points(state)[3:] + in_gripper
+        draw_moment(axes, arm, heading, {"commanded": part.commands[step], "true": state}, ball, 7)
         axes.plot(*bowl.T, color=COLORS["grey"], label="bowl")
-        axes.set_aspect("equal")
         label_axes(axes, "x [mm]", title=title)
     label_axes(panels[0], y="up [mm]")
     legend(figure)
@@ -166,104 +154,108 @@ def mean_over_runs(traces: pd.DataFrame, column: str) -> pd.DataFrame:
     return pd.DataFrame({"mean": steps.mean(), "sd": steps.std(ddof=0)}).reset_index()
 
 
-def draw_mean(
-    axes: Any, traces: pd.DataFrame, column: str, timestep: float, style: Mapping[str, Any], label: str
-) -> None:
-    """Draw the mean of a column over time with its standard deviation."""
-    curve = mean_over_runs(traces, column)
-    time = timestep * curve["step"]
-    axes.plot(time, curve["mean"], **style, label=label)
-    error_band(axes, time, curve["mean"] - curve["sd"], curve["mean"] + curve["sd"], style["color"])
+class Curve(NamedTuple):
+    """What is averaged over runs: a column of their traces [mm], the duration of a step, and its looks."""
+
+    traces: pd.DataFrame
+    column: str
+    timestep: float
+    style: Mapping[str, Any]
+    label: str
+
+
+def over_time(
+    curves: Sequence[Curve],
+    x: str = "time [s]",
+    y: str = "error to the goal [mm]",
+    *,
+    single: pd.DataFrame | None = None,
+    threshold: Mapping[str, Any] | None = THRESHOLD,
+    **options: Any,
+) -> Figure:
+    """Draw means with their standard deviations over time, after some single runs."""
+
+    def draw(axes: Any, rows: pd.DataFrame) -> None:
+        plant = rows["plant"].iloc[0]
+        if single is not None:
+            for number, run in single[single["plant"] == plant].groupby("run"):
+                label = "" if number else "one block of eight runs"
+                time = curves[0].timestep * run["step"]
+                axes.plot(time, run["error_mm"], color=COLORS["grey"], linewidth=0.7, label=label)
+        for traces, column, timestep, style, label in curves:
+            mean = mean_over_runs(traces[traces["plant"] == plant], column)
+            time, middle = timestep * mean["step"], mean["mean"]
+            axes.plot(time, middle, **style, label=label)
+            error_band(axes, time, middle - mean["sd"], middle + mean["sd"], style["color"])
+        if threshold is None:
+            axes.set_ylim(bottom=0)
+        else:
+            axes.axhline(50, **threshold)
+
+    return panel_per_plant(curves[0].traces, draw, x, y, **options)
 
 
 def fig07_single_runs(traces: pd.DataFrame, timestep: float, step_size: float) -> Figure:
     """Draw the error of eight single runs and of the mean over all (Figs. 7, 16 and 17)."""
-
-    def draw(axes: Any, rows: pd.DataFrame) -> None:
-        for number, run in rows[rows["block"] == 0].groupby("run"):
-            label = "" if number else "one block of eight runs"
-            time = timestep * run["step"]
-            axes.plot(time, run["error_mm"], color=COLORS["grey"], linewidth=0.7, label=label)
-        draw_mean(axes, rows, "error_mm", timestep, ESTIMATE, "mean and sd of all runs")
-        axes.axhline(50, **THRESHOLD)
-
-    rows = traces[traces["alpha"] == step_size]
-    return panel_per_plant(rows, draw, "time [s]", ERROR, f", step size {step_size}")
+    runs = traces[traces["alpha"] == step_size]
+    mean = Curve(runs, "error_mm", timestep, ESTIMATE, "mean and sd of all runs")
+    return over_time([mean], single=runs[runs["block"] == 0], note=f", step size {step_size}")
 
 
 def fig08_step_sizes(
     traces: pd.DataFrame, timestep: Mapping[float, float], step_sizes: Sequence[float]
 ) -> Figure:
     """Draw the mean error over time for each step size (Fig. 8)."""
-
-    def draw(axes: Any, rows: pd.DataFrame) -> None:
-        for color, step_size in zip(SERIES, step_sizes):
-            chosen = rows[rows["alpha"] == step_size]
-            label = f"step size {step_size}"
-            draw_mean(axes, chosen, "error_mm", timestep[step_size], {"color": color}, label)
-        axes.axhline(50, **THRESHOLD)
-
-    return panel_per_plant(traces, draw, "time [s]", ERROR)
+    curves = []
+    for color, step_size in zip(SERIES, step_sizes):
+        runs, label = traces[traces["alpha"] == step_size], f"step size {step_size}"
+        curves.append(Curve(runs, "error_mm", timestep[step_size], {"color": color}, label))
+    return over_time(curves)
 
 
 def fig09_commanded_and_measured(traces: pd.DataFrame, timestep: float, step_size: float) -> Figure:
     """Draw the distance of f(q_sys) and of the measured gripper from the calibrated place (Figs. 9, 18 and
     20)."""
-    return _two_distances(traces, timestep, step_size, "commanded", COMMANDED, "commanded, f(q_sys)")
+    return _two_distances(traces, timestep, step_size, "commanded", "commanded, f(q_sys)")
 
 
 def fig10_estimated_and_measured(traces: pd.DataFrame, timestep: float, step_size: float) -> Figure:
     """Draw the distance of f(q_est) and of the measured gripper from the calibrated place (Figs. 10, 19 and
     21)."""
-    return _two_distances(traces, timestep, step_size, "estimated", ESTIMATE, "estimated, f(q_est)")
+    return _two_distances(traces, timestep, step_size, "estimated", "estimated, f(q_est)")
 
 
-def _two_distances(
-    traces: pd.DataFrame, timestep: float, step_size: float, which: str, style: Mapping[str, Any], label: str
-) -> Figure:
-    def draw(axes: Any, rows: pd.DataFrame) -> None:
-        draw_mean(axes, rows, f"{which}_mm", timestep, style, label)
-        draw_mean(axes, rows, "measured_mm", timestep, MEASURED, "measured")
-        draw_mean(axes, rows, f"{which}_gap_mm", timestep, {"color": COLORS["green"]}, "between the two")
-        axes.set_ylim(bottom=0)
-
-    rows = traces[traces["alpha"] == step_size]
-    y = "from the calibrated place [mm]"
-    return panel_per_plant(rows, draw, "time [s]", y, f", step size {step_size}")
+def _two_distances(traces: pd.DataFrame, timestep: float, step_size: float, which: str, label: str) -> Figure:
+    runs = traces[traces["alpha"] == step_size]
+    curves = [
+        Curve(runs, f"{which}_mm", timestep, SHAPES[which], label),
+        Curve(runs, "measured_mm", timestep, MEASURED, "measured"),
+        Curve(runs, f"{which}_gap_mm", timestep, {"color": COLORS["green"]}, "between the two"),
+    ]
+    y, note = "from the calibrated place [mm]", f", step size {step_size}"
+    return over_time(curves, y=y, note=note, threshold=None)
 
 
 def fig12_guidance(
     automated: pd.DataFrame, guided: pd.DataFrame, timestep: float, step_size: float
 ) -> Figure:
     """Draw the error of automated handovers beside guided ones (Figs. 12 and 22)."""
-    traces = pd.concat([automated.assign(guided=False), guided.assign(guided=True)])
-    labels = {False: "automated", True: "guided by a hand"}
-    return _two_errors(traces, step_size, "guided", labels, timestep, "time [s]", 3.0)
+    alone, led = (traces[traces["alpha"] == step_size] for traces in (automated, guided))
+    curves = [
+        Curve(alone, "error_mm", timestep, ESTIMATE, "automated"),
+        Curve(led, "error_mm", timestep, {"color": COLORS["vermillion"]}, "guided by a hand"),
+    ]
+    return over_time(curves, threshold=GREY_THRESHOLD, note=f", step size {step_size}")
 
 
 def without_estimation(traces: pd.DataFrame, step_size: float) -> Figure:
     """Draw the error with and without the state optimisation."""
-    labels = {True: "with state optimisation", False: "without"}
-    seen = traces.dropna(subset="error_mm")
-    return _two_errors(seen, step_size, "estimated", labels, 1.0, "step", 2.8)
-
-
-def _two_errors(
-    traces: pd.DataFrame,
-    step_size: float,
-    by: str,
-    labels: Mapping[bool, str],
-    timestep: float,
-    x: str,
-    height: float,
-) -> Figure:
-    def draw(axes: Any, rows: pd.DataFrame) -> None:
-        for style, (value, label) in zip((ESTIMATE, {"color": COLORS["vermillion"]}), labels.items()):
-            draw_mean(axes, rows[rows[by] == value], "error_mm", timestep, style, label)
-        axes.axhline(50, **GREY_THRESHOLD)
-
-    rows = traces[traces["alpha"] == step_size]
-    return panel_per_plant(rows, draw, x, ERROR, f", step size {step_size}", height)
+    seen = traces[traces["alpha"] == step_size].dropna(subset="error_mm")
+    curves = [
+        Curve(seen[seen["estimated"]], "error_mm", 1.0, ESTIMATE, "with state optimisation"),
+        Curve(seen[~seen["estimated"]], "error_mm", 1.0, {"color": COLORS["vermillion"]}, "without"),
+    ]
+    return over_time(curves, "step", threshold=GREY_THRESHOLD, note=f", step size {step_size}", height=2.8)
 
 
 def success_over_opening(table: pd.DataFrame) -> Figure:

@@ -13,19 +13,10 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
-from numpy.typing import NDArray
 
-from soro_lib.papers.soft_handover.figures.handovers import COMMANDED, stacked_shares
-from soro_lib.replication.plotting import (
-    COLORS,
-    ESTIMATE,
-    PAGE_WIDTH,
-    TRUTH,
-    equal_aspect,
-    label_axes,
-    legend,
-    new_figure,
-)
+from soro_lib.papers.soft_handover.figures.handovers import SHAPES, stacked_shares
+from soro_lib.papers.soft_handover.world.plant import Array
+from soro_lib.replication.plotting import COLORS, PAGE_WIDTH, equal_aspect, label_axes, legend, new_figure
 from soro_lib.robots.helix import origin_from_arm_base
 from soro_lib.sensing.camera import Image
 from soro_lib.sensing.handover_vision import Look
@@ -98,11 +89,7 @@ def fig04_detections(
 
 
 def close_ups(
-    images: Sequence[Image],
-    cameras: Sequence[CalibratedCamera],
-    look: Look,
-    ball: NDArray[np.float64],
-    half: int = 70,
+    images: Sequence[Image], cameras: Sequence[CalibratedCamera], look: Look, ball: Array, half: int = 70
 ) -> list[Image]:
     """Return what each camera shows around a true ball (3,) [m], the found circle drawn finely."""
     pictures = []
@@ -288,16 +275,7 @@ def comparison_with_noise_model(rendered: pd.DataFrame, modelled: Mapping[str, p
     return figure
 
 
-SHAPE_STYLES = {"true": TRUTH, "commanded": COMMANDED, "estimated": ESTIMATE}
-"""The arm's shapes."""
-
-
-def explorer_view(
-    pictures: Sequence[Image],
-    shapes: Mapping[str, NDArray[np.float64]],
-    ball: NDArray[np.float64],
-    status: str,
-) -> Figure:
+def explorer_view(pictures: Sequence[Image], shapes: Mapping[str, Array], ball: Array, status: str) -> Figure:
     """Draw what the explorer shows: both pictures, and the shapes of the arm beside the ball.
 
     Parameters
@@ -321,7 +299,7 @@ def explorer_view(
     drawn = [1e3 * origin_from_arm_base(ball[None])]
     for name, points in shapes.items():
         drawn.append(1e3 * origin_from_arm_base(points))
-        style = {key: value for key, value in SHAPE_STYLES[name].items() if key != "zorder"}
+        style = {key: value for key, value in SHAPES[name].items() if key != "zorder"}
         space.plot(*drawn[-1].T, **style, label=name)
     space.plot(*drawn[0].T, "o", color=COLORS["green"], markersize=8, label="ball")
     equal_aspect(space, np.concatenate(drawn))

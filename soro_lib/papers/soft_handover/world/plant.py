@@ -67,7 +67,7 @@ class HoldingHand:
 
 
 class HelixPlant(Protocol):
-    """What a simulated arm offers to a study."""
+    """What a simulated arm offers to a study; one that derives from it has neither memory nor weight."""
 
     def settle(self, tendon_lengths: ArrayLike, hand: HoldingHand | None = None) -> Array:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m]."""
@@ -75,11 +75,9 @@ class HelixPlant(Protocol):
 
     def carry(self, mass: float) -> None:
         """Hang a mass [kg] into the gripper."""
-        ...
 
     def reset(self) -> None:
         """Forget where the arm is and what it carries."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -109,7 +107,7 @@ class Stiffness:
 
 
 @dataclass
-class AngleLossPlant:
+class AngleLossPlant(HelixPlant):
     """Plant K: every segment realises a fixed share of its commanded bending angle, and its length in full.
 
     Gravity straightens a hanging arm; that is all this plant knows of it. The shares have no printed value:
@@ -132,12 +130,6 @@ class AngleLossPlant:
         if len(self.realised) != 3 or not all(0 < share <= 1 for share in self.realised):
             raise ValueError(f"realised must be three shares in (0, 1], got {self.realised}")
         self._shares = np.stack([self.realised, self.realised, np.ones(3)], axis=-1).ravel()
-
-    def reset(self) -> None:
-        """Do nothing: the state depends on the command alone."""
-
-    def carry(self, mass: float) -> None:
-        """Take a mass [kg] without any effect: this plant knows no weight."""
 
     def settle(self, tendon_lengths: ArrayLike, hand: HoldingHand | None = None) -> Array:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m].

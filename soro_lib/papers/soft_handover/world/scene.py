@@ -16,12 +16,15 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.random import Generator
+from numpy.typing import ArrayLike
 
 from soro_lib.arcs import backbone, chain_transform
+from soro_lib.papers.soft_handover.world.plant import Array
 from soro_lib.robots.helix import HelixArm
 from soro_lib.sensing.camera import Camera, Image, look_at, transform_points
 from soro_lib.sensing.marker_ring import MarkerRing
+from soro_lib.sensing.stereo_vision import CalibratedCamera
 from soro_lib.worlds.rendering import Drawable, Photometry, Polygon, TexturedQuad, motion_kernel, render
 from soro_lib.worlds.round_bodies import Color, Sphere, Tube
 
@@ -39,30 +42,14 @@ BALL: Color = (60, 175, 50)
 DULL_GREEN: Color = (88, 118, 92)
 
 
-@dataclass(frozen=True, eq=False)
-class Viewpoint:
-    """A camera and where it stands.
-
-    Attributes
-    ----------
-    camera : Camera
-        Intrinsic parameters.
-    pose : ndarray, shape (4, 4)
-        ``camera_in_world``, frame `arm_base`.
-    """
-
-    camera: Camera
-    pose: NDArray[np.float64]
-
-    @classmethod
-    def aimed(cls, position: ArrayLike, target: ArrayLike, camera: Camera = BRIO) -> "Viewpoint":
-        """Return an upright camera at ``position`` aimed at ``target``, both (3,) [m] in `arm_base`."""
-        return cls(camera, look_at(position, target, UP))
+def aimed(position: ArrayLike, target: ArrayLike, camera: Camera = BRIO) -> CalibratedCamera:
+    """Return an upright camera at ``position`` aimed at ``target``, both (3,) [m] in `arm_base`."""
+    return CalibratedCamera(camera, look_at(position, target, UP))
 
 
 def stereo_pair(
     baseline: float = 0.5, distance: float = 0.75, toe_in: float = 0.5, camera: Camera = BRIO
-) -> tuple[Viewpoint, Viewpoint]:
+) -> tuple[CalibratedCamera, CalibratedCamera]:
     """Return the left and the right camera, as seen from behind them.
 
     Parameters
@@ -77,7 +64,7 @@ def stereo_pair(
     """
     height = 0.62
     return tuple(  # type: ignore[return-value]
-        Viewpoint.aimed((x, distance, height), ((1 - toe_in) * x, 0.0, height), camera)
+        aimed((x, distance, height), ((1 - toe_in) * x, 0.0, height), camera)
         for x in (-baseline / 2, baseline / 2)
     )
 
@@ -85,7 +72,7 @@ def stereo_pair(
 STEREO = stereo_pair()
 """The cameras of the replication, half toed in, so that both see where the thesis's four locations are."""
 
-SIDE_CAMERA = Viewpoint.aimed((0.80, -0.05, 0.62), (0.0, -0.05, 0.62))
+SIDE_CAMERA = aimed((0.80, -0.05, 0.62), (0.0, -0.05, 0.62))
 """A third camera, which looks at the arm from the right."""
 
 
@@ -141,14 +128,14 @@ class HandoverScene:
         items += [*self._gripper(wrist), self.ball(ball), *(self._hand(ball) if extras.hand else [])]
         return items if extras.second_ball is None else [*items, self.ball(np.array(extras.second_ball))]
 
-    def wrist(self, state: ArrayLike) -> NDArray[np.float64]:
+    def wrist(self, state: ArrayLike) -> Array:
         """Return ``wrist_in_world`` (4, 4) for a true state q (9,), which no actuator limits."""
         q = np.asarray(state, dtype=float)
         if q.shape != (9,):
             raise ValueError(f"state must be nine numbers, got shape {q.shape}")
         return chain_transform(q.reshape(3, 3))
 
-    def _arm(self, state: NDArray[np.float64]) -> list[Drawable]:
+    def _arm(self, state: Array) -> list[Drawable]:
         """Return two tubes per segment, their slices alternating like the helicoid's."""
         slices = 8
         points = backbone(state.reshape(3, 3), 2 * slices)
@@ -158,14 +145,14 @@ class HandoverScene:
             for i in range(0, len(points) - 1, slices)
         ]
 
-    def _ring(self, wrist: NDArray[np.float64], hidden: frozenset[int]) -> list[Drawable]:
+    def _ring(self, wrist: Array, hidden: frozenset[int]) -> list[Drawable]:
         pictures = [CLOTH if i in hidden else picture for i, picture in enumerate(self.ring.prints)]
         return [
             TexturedQuad(transform_points(wrist, corners), picture, supersampling=3)
             for corners, picture in zip(self.ring.facets, pictures)
         ]
 
-    def _gripper(self, wrist: NDArray[np.float64]) -> list[Drawable]:
+    def _gripper(self, wrist: Array) -> list[Drawable]:
         """Return the palm and three open fingers."""
         below = self.ring.height / 2
         length = self.arm.gripper_length
@@ -178,13 +165,13 @@ class HandoverScene:
             parts.append(Tube(transform_points(wrist, finger), 0.007, (PLASTIC,)))
         return parts
 
-    def ball(self, centre: NDArray[np.float64]) -> Sphere:
+    def ball(self, centre: Array) -> Sphere:
         """Return the green ball with its middle at a point (3,) [m]."""
         return Sphere(
             centre, self.ball_radius, BALL, to_light=(0.3, 0.5, -1.0), ambient=0.55, supersampling=2
         )
 
-    def _hand(self, ball: NDArray[np.float64]) -> list[Drawable]:
+    def _hand(self, ball: Array) -> list[Drawable]:
         """Return a palm under the ball, fingers and a forearm that comes from outside and below."""
         away = np.append(ball[:2], 0.0)
         norm = np.linalg.norm(away)
@@ -260,7 +247,7 @@ NOISE_MARGIN = 160
 
 
 def photograph(
-    items: Sequence[Drawable], view: Viewpoint, photometry: Photometry, rng: np.random.Generator
+    items: Sequence[Drawable], view: CalibratedCamera, photometry: Photometry, rng: Generator
 ) -> Image:
     """Return the picture (height, width, 3), blue, green, red, that a camera takes of things in the room.
 
@@ -268,7 +255,7 @@ def photograph(
     ----------
     items : sequence of Drawable
         Of :meth:`HandoverScene.items`.
-    view : Viewpoint
+    view : CalibratedCamera
         The camera.
     photometry : Photometry
         Gain, blur, motion and read noise. The noise here does not depend on the signal (shot_noise is not
@@ -293,7 +280,7 @@ def photograph(
 
 
 def photographs(
-    items: Sequence[Drawable], views: Sequence[Viewpoint], photometry: Photometry, rng: np.random.Generator
+    items: Sequence[Drawable], views: Sequence[CalibratedCamera], photometry: Photometry, rng: Generator
 ) -> list[Image]:
     """Return the pictures that several cameras take at once, see :func:`photograph`."""
     return [photograph(items, view, photometry, rng) for view in views]
