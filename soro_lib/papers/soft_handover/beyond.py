@@ -14,7 +14,7 @@ import pandas as pd
 from soro_lib.controllers.handover import HandoverParameters
 from soro_lib.controllers.virtual_stiffness import ErrorDependentStep, VirtualStiffnessController
 from soro_lib.estimators.handover_filters import MEASURED_NOISE
-from soro_lib.papers.soft_handover.experiments.handover import Settings, compare, thesis_parameters
+from soro_lib.papers.soft_handover.experiments.handover import Blocks, Settings, compare, thesis_parameters
 from soro_lib.papers.soft_handover.world.observer import Observer
 from soro_lib.papers.soft_handover.world.plant import HelixPlant, LaggingPlant
 
@@ -45,7 +45,7 @@ def suggestions() -> Settings:
     floorless = thesis_parameters(0.4, **NO_FLOOR)
     measured = replace(thesis, filters=MEASURED_NOISE)
     variable = VirtualStiffnessController(step_size=VARIABLE_STEP)
-    floorless_variable = replace(variable, **NO_FLOOR)
+    floorless_variable = replace(variable, error_reference="measurement")
     return labelled(
         {
             "thesis, step 0.4": thesis,
@@ -76,7 +76,7 @@ def compare_eyes(
     """
     settings = [*labelled({"thesis, step 0.1": thesis_parameters(0.1)}), *FASTEST]
     tables = [
-        compare(settings, plants, observer, repetitions, seed, observer=name)[0]
+        compare(settings, plants, Blocks(observer, repetitions, seed), observer=name)[0]
         for name, observer in observers.items()
     ]
     return pd.concat(tables, ignore_index=True)
@@ -84,11 +84,9 @@ def compare_eyes(
 
 def loop_speed(
     plants: Mapping[str, HelixPlant],
-    observer: Observer,
+    blocks: Blocks,
     timesteps: Sequence[float],
     time_constants: Sequence[float],
-    repetitions: int,
-    seed: int,
 ) -> pd.DataFrame:
     """Return handover times over the duration of a step, for arms that need time to move (Section 5.4.5).
 
@@ -105,7 +103,7 @@ def loop_speed(
     for time_constant, timestep in product(time_constants, timesteps):
         lagging = {name: LaggingPlant(plant, timestep, time_constant) for name, plant in plants.items()}
         labels = {"timestep_s": timestep, "time_constant_s": time_constant}
-        tables.append(compare(FASTEST, lagging, observer, repetitions, seed, step_limit=600, **labels)[0])
+        tables.append(compare(FASTEST, lagging, blocks, step_limit=600, **labels)[0])
     runs = pd.concat(tables, ignore_index=True)
     return runs.assign(time_s=runs["steps"] * runs["timestep_s"])
 

@@ -71,8 +71,13 @@ def fit_plant_k(iterations: int = 600) -> NDArray[np.float64]:
         unevenness = EVENNESS * (realised - realised.mean())
         return float(np.sum((final_distances(realised) - target) ** 2) + np.sum(unevenness**2))
 
-    options = {"xatol": 2e-3, "fatol": 1e-8, "maxiter": iterations}
-    return minimize(misfit, np.full(3, 0.5), method="Nelder-Mead", options=options).x
+    fit = minimize(
+        misfit,
+        np.full(3, 0.5),
+        method="Nelder-Mead",
+        options={"xatol": 2e-3, "fatol": 1e-8, "maxiter": iterations},
+    )
+    return fit.x
 
 
 def main() -> None:

@@ -178,6 +178,10 @@ SHAPE_LOOKS = {
 }
 """Radius [m] and colour of the arm's shapes in the drawing."""
 
+SIDES = ("left", "right")
+
+CAPTION = "grey: true arm, purple: commanded, blue: estimated; drag to turn"
+
 GRAB = 90.0
 """How near to ball or gripper a drag must begin [px]."""
 
@@ -208,8 +212,7 @@ class HandoverExplorer(ipywidgets.VBox):
             buttons.style.button_width = "70px"
         self.step_size = ipywidgets.FloatSlider(description="alpha", min=0.05, max=1.0, step=0.05, value=0.2)
         self.covers = [
-            ipywidgets.Checkbox(description=f"cover the {side} camera", indent=False)
-            for side in ("left", "right")
+            ipywidgets.Checkbox(description=f"cover the {side} camera", indent=False) for side in SIDES
         ]
         self.message = ipywidgets.HTML()
         self.view = ArmView(layout={"flex": "1 1 420px", "min_width": "320px"})
@@ -298,20 +301,13 @@ class HandoverExplorer(ipywidgets.VBox):
 
     def _draw(self) -> None:
         session = self.session
-        for camera, picture, side in zip(self.cameras, session.pictures(), ("left", "right")):
+        for camera, picture, side in zip(self.cameras, session.pictures(), SIDES):
             camera.label = f"{side} camera: {session.status()}"
             camera.picture = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
         tubes = [tube(points, *SHAPE_LOOKS[name]) for name, points in session.shapes().items()]
         tubes.append(tube([session.ball, session.ball + 1e-3], 0.020, COLORS["green"]))
-        self.view.scene = arm_scene(
-            tubes,
-            session.observer.scene.wrist(session.state),
-            LOW,
-            HIGH,
-            hangs=True,
-            grid=0.1,
-            caption="grey: true arm, purple: commanded, blue: estimated; drag to turn",
-        )
+        wrist = session.observer.scene.wrist(session.state)
+        self.view.scene = arm_scene(tubes, wrist, LOW, HIGH, hangs=True, grid=0.1, caption=CAPTION)
         self.message.value = session.status()
 
 

@@ -3,8 +3,9 @@
 The same claims are tried on both plants; the scorecard takes plant K unless a row names plant E.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -48,7 +49,9 @@ class HandoverTables:
         return HandoverTables(*(table[table["plant"] == plant] for table in vars(self).values()))
 
 
-def by_block(runs: pd.DataFrame, columns: str, values: str, statistic: str = "median") -> pd.DataFrame:
+def by_block(
+    runs: pd.DataFrame, columns: str, values: str, statistic: Literal["mean", "median"] = "median"
+) -> pd.DataFrame:
     """Return a statistic of the runs of each block."""
     return runs.pivot_table(index="block", columns=columns, values=values, aggfunc=statistic)
 
@@ -266,7 +269,7 @@ def definition_findings() -> dict[str, Finding]:
     }
     for name, noise in vars(filters).items():
         values |= {f"appa_q_{name}": noise.process, f"appa_r_{name}": noise.measurement}
-    segments = {
+    segments: dict[str, Iterable[float]] = {
         "s31_length": arm.rest_lengths,
         "eq11_bend": upper[::2],
         "eq11_shortest": lower[1::2],

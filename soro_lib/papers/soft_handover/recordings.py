@@ -7,7 +7,7 @@ one on each core. The same seed and the locked packages give the same bytes, wha
 
 import os
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from itertools import product
@@ -27,6 +27,9 @@ from soro_lib.replication.datacards import generator_options, read_card, write_c
 from soro_lib.sensing.handover_vision import ESTIMATORS
 
 FOLDER = data_directory("soft_handover")
+MEANING = tomllib.loads((FOLDER / "recordings.toml").read_text(encoding="utf-8"))
+"""What the recordings, their columns and the camera systems are, in words."""
+
 GENERATOR = "soro_lib.papers.soft_handover.recordings"
 BLOCKS = 2
 """Blocks of eight handovers of each controller."""
@@ -56,7 +59,7 @@ def handovers(plant: str, estimator: str, block: int, small: bool) -> Tables:
     return {"rendered_runs": runs, "rendered_traces": traces}
 
 
-def jobs(small: bool = False) -> dict[str, Callable[[], Tables]]:
+def jobs(small: bool = False) -> Mapping[str, Callable[[], Tables]]:
     """Return all jobs by name, the longest first; in the small form two handovers, and two poses of all
     else."""
     eyes = list(zip("KE", ESTIMATORS)) if small else list(product("KE", ESTIMATORS))
@@ -84,19 +87,10 @@ def write_table(name: str, table: pd.DataFrame, directory: Path) -> Path:
         compression={"method": "gzip", "compresslevel": 9, "mtime": 0},
     )
     os.replace(unfinished, path)
-    meaning = tomllib.loads((FOLDER / "recordings.toml").read_text(encoding="utf-8"))
-    columns = {column: meaning["columns"][column] for column in table.columns}
-    description = meaning["recordings"][name]
+    columns = {column: MEANING["columns"][column] for column in table.columns}
+    description = MEANING["recordings"][name]
     write_card(path, description=description, columns=columns, generator=GENERATOR, seed=SEED)
     return path
-
-
-NOISE_COMMENTS = {
-    "thesis": "average over the markers of both cameras",
-    "gated": "consensus among both solutions of every marker",
-    "joint": "one robust fit of the known ring to all corners",
-    "three cameras": "joint fit with a camera from the side",
-}
 
 
 def write_noise(figures: dict[str, dict[str, float]], poses: int, directory: Path) -> Path:
@@ -108,7 +102,7 @@ def write_noise(figures: dict[str, dict[str, float]], poses: int, directory: Pat
     ]
     for estimator, values in figures.items():
         key = f'"{estimator}"' if " " in estimator else estimator
-        lines += ["", f"[estimator.{key}.noise]  # {NOISE_COMMENTS[estimator]}"]
+        lines += ["", f"[estimator.{key}.noise]  # {MEANING['camera_systems'][estimator]}"]
         lines += [f"{name} = {value:.6f}" for name, value in values.items()]
     path = directory / "vision_noise.toml"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

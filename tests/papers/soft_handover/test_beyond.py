@@ -14,7 +14,9 @@ PLANTS = {"K": plant_k(), "E": ElasticPlant()}
 
 def test_best_controller_beats_the_thesis_in_steps_and_distance():
     runs = pd.concat(
-        handover.handovers(parameters, PLANTS["K"], EYES, 2, 3, controller=name, plant="K")[0]
+        handover.handovers(parameters, PLANTS["K"], handover.Blocks(EYES, 2, 3), controller=name, plant="K")[
+            0
+        ]
         for name, parameters in (
             ("thesis", handover.thesis_parameters(0.4)),
             ("best", improvements.best_controller()),

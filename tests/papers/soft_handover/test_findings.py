@@ -15,14 +15,22 @@ PLANTS = {"K": plant_k(), "E": ElasticPlant()}
 
 
 def test_findings_fill_the_scorecard():
-    runs, traces = handover.step_size_experiment(PLANTS, EYES, (0.1, 0.2, 0.4), 1, 1)
-    guided, _ = handover.step_size_experiment(PLANTS, EYES, (0.1, 0.2), 1, 1, guide=guidance.GuidingHand())
+    runs, traces = handover.compare(
+        handover.by_step_size((0.1, 0.2, 0.4)), PLANTS, handover.Blocks(EYES, 1, 1)
+    )
+    guided, _ = handover.compare(
+        handover.by_step_size((0.1, 0.2)), PLANTS, handover.Blocks(EYES, 1, 1), guide=guidance.GuidingHand()
+    )
     cases = pd.concat(
-        use_case.use_cases(handover.thesis_parameters(0.4), plant, EYES, 1, 1, plant=name)
+        use_case.use_cases(handover.thesis_parameters(0.4), plant, handover.Blocks(EYES, 1, 1), plant=name)
         for name, plant in PLANTS.items()
     )
-    bare, _ = handover.compare(variants.with_and_without_estimation(0.4), PLANTS, EYES, 1, 1, step_limit=30)
-    suggested, _ = handover.compare(improvements.suggestions(), PLANTS, EYES, 1, 1, step_limit=150)
+    bare, _ = handover.compare(
+        variants.with_and_without_estimation(0.4), PLANTS, handover.Blocks(EYES, 1, 1), step_limit=30
+    )
+    suggested, _ = handover.compare(
+        improvements.suggestions(), PLANTS, handover.Blocks(EYES, 1, 1), step_limit=150
+    )
     tables = findings.HandoverTables(runs, traces, guided, cases, bare, suggested)
     result = findings.findings(tables, {a: timestep(a) for a in (0.1, 0.2, 0.4)})
     card = build_scorecard("soft_handover", result).set_index("id")

@@ -8,6 +8,7 @@ every command stayed within the limits of arm and motors.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,10 +19,10 @@ from soro_lib.controllers.virtual_stiffness import within_limits
 from soro_lib.papers.soft_handover.experiments.handover import (
     HOLDER,
     BallHolder,
+    Blocks,
     Guide,
     HandoverRun,
     run_handover,
-    trials,
 )
 from soro_lib.papers.soft_handover.world.observer import Observer
 from soro_lib.papers.soft_handover.world.plant import Array, HelixPlant, HoldingHand
@@ -153,11 +154,12 @@ def not_a_number(look: HandoverObservation, rng: Generator) -> HandoverObservati
 
 def flipped_markers(look: HandoverObservation, rng: Generator) -> HandoverObservation:
     """Turn the gripper's direction by 60 degrees and throw the wrist 8 cm off."""
+    wrist, direction = np.asarray(look.wrist), np.asarray(look.direction)
     aside = rng.standard_normal(3)
-    aside -= np.sum(aside * look.direction) * look.direction
+    aside -= np.sum(aside * direction) * direction
     aside /= magnitude(aside)
-    direction = np.cos(np.pi / 3) * look.direction + np.sin(np.pi / 3) * aside
-    return replace(look, direction=direction, wrist=look.wrist + 0.08 * aside)
+    turned = np.cos(np.pi / 3) * direction + np.sin(np.pi / 3) * aside
+    return replace(look, direction=turned, wrist=wrist + 0.08 * aside)
 
 
 def second_ball(look: HandoverObservation, rng: Generator) -> HandoverObservation:
@@ -223,12 +225,10 @@ def all_faults() -> list[Fault]:
 def run_faults(
     parameters: HandoverParameters,
     plant: HelixPlant,
-    observer: Observer,
-    repetitions: int,
-    seed: int,
+    blocks: Blocks,
+    faults: Sequence[Fault],
     /,
     *,
-    faults: Sequence[Fault],
     step_limit: int = 120,
     **labels: object,
 ) -> pd.DataFrame:
@@ -240,10 +240,10 @@ def run_faults(
     rows = []
     for fault in faults:
         controller = HandoverController(replace(parameters, motors=fault.motors))
-        eyes = FaultyObserver(observer, fault.change)
-        options = {"holder": fault.holder, "guide": fault.guide, "step_limit": step_limit}
+        eyes = FaultyObserver(blocks.observer, fault.change)
+        options: dict[str, Any] = {"holder": fault.holder, "guide": fault.guide, "step_limit": step_limit}
         names = {**labels, "fault": fault.name, "severity": fault.severity}
-        for _, ball, rng in trials(fault.holder, repetitions, seed):
+        for _, ball, rng in blocks.draw(fault.holder):
             run = run_handover(controller, plant, eyes, ball, rng, **options)
             rows.append({**names, "outcome": outcome(run), "violations": violations(run, fault.motors)})
     return pd.DataFrame(rows)

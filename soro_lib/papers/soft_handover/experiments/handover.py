@@ -6,7 +6,7 @@ by the true ball in the true gripper, never by what the filters believe. Frame `
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -98,8 +98,6 @@ class HandoverRun:
         Why the arm gave up, or "".
     success : bool
         Whether the true ball was in the true gripper when it closed.
-    miss : float
-        Distance from the true gripper point to the true ball at the end [m].
     lateral_overshoot : float
         Farthest that the true gripper went past the ball, sideways [m].
     state, ball : ndarray
@@ -120,7 +118,6 @@ class HandoverRun:
     mode: Mode
     reason: str
     success: bool
-    miss: float
     lateral_overshoot: float
     state: Array
     ball: Array
@@ -170,12 +167,13 @@ def run_handover(
     for step in range(step_limit):
         held_ball = ball + next(sways)
         command = controller.update(observer.observe(state, held_ball, rng))
-        looks.append(Moment(state, held_ball, command))
+        looks.append((state, held_ball, command))
         if command.mode in (Mode.GRASP, Mode.STOPPED):
             break
         hand = guide(step, tip_points(state, arm.gripper_length)[3:], held_ball) if guide else None
         state = plant.settle(motors.pull(command.tendon_change), hand)
-    return judged(looks, arm)
+    states, balls, commands = zip(*looks)
+    return judged(np.array(states), np.array(balls), commands, arm)
 
 
 def still_handover(
@@ -192,18 +190,9 @@ def still_handover(
     return run_handover(controller, plant, eyes, ball, rng, holder=holder, step_limit=step_limit)
 
 
-class Moment(NamedTuple):
-    """True state (9,), true ball (3,) [m] and the command that followed from seeing them."""
-
-    state: Array
-    ball: Array
-    command: HandoverCommand
-
-
-def judged(looks: Sequence[Moment], arm: HelixArm) -> HandoverRun:
-    """Return what a run came to, judged by the true ball in the true gripper."""
-    states, balls = (np.array(column) for column in list(zip(*looks))[:2])
-    commands = [look.command for look in looks]
+def judged(states: Array, balls: Array, commands: Sequence[HandoverCommand], arm: HelixArm) -> HandoverRun:
+    """Return what a run came to from the true states (n, 9), the true balls (n, 3) [m] and the commands that
+    followed: success is the true ball in the true gripper."""
     unknown = np.full(9, np.nan)
     q_sys = np.array([command.q_sys for command in commands])
     q_est = np.array([unknown if command.q_est is None else command.q_est for command in commands])
@@ -226,18 +215,17 @@ def judged(looks: Sequence[Moment], arm: HelixArm) -> HandoverRun:
         "true_mm": apart(true, CALIBRATED_GRIPPER),
         "descending": np.array([c.mode in (Mode.DESCEND, Mode.GRASP) for c in commands], dtype=float),
     }
-    state, ball, last = looks[-1]
+    last = commands[-1]
     away = (balls[0] - CALIBRATED_GRIPPER)[:2]
     away /= np.linalg.norm(away)
     return HandoverRun(
-        steps=len(looks) - 1,
+        steps=len(commands) - 1,
         mode=last.mode,
         reason=last.reason,
-        success=last.mode is Mode.GRASP and Gripper().holds(arm.tip_points(state), ball),
-        miss=1e-3 * float(trace["miss_mm"][-1]),
+        success=last.mode is Mode.GRASP and Gripper().holds(arm.tip_points(states[-1]), balls[-1]),
         lateral_overshoot=float(((true - balls)[:, :2] @ away).max()),
-        state=state,
-        ball=ball,
+        state=states[-1],
+        ball=balls[-1],
         states=states,
         commands=q_sys,
         estimates=q_est,
@@ -246,28 +234,38 @@ def judged(looks: Sequence[Moment], arm: HelixArm) -> HandoverRun:
     )
 
 
-Trial = tuple[dict[str, object], Array, Generator]
-"""Block, number and location of a run, where the ball is (3,) [m], and the run's random numbers."""
+@dataclass(frozen=True)
+class Blocks:
+    """The thesis's blocks of eight runs, four locations twice (Vervloet, Section 3.5.1).
 
-
-def trials(holder: BallHolder, repetitions: int, seed: int) -> Iterator[Trial]:
-    """Yield the thesis's blocks of eight runs, four locations twice (Vervloet, Section 3.5.1).
-
-    The runs of one seed are the same whatever else runs.
+    Attributes
+    ----------
+    observer : Observer
+        The eyes of all runs.
+    repetitions : int
+        Number of blocks.
+    seed : int
+        The runs of one seed are the same whatever else runs.
     """
-    places = [location for location in holder.headings for _ in range(2)]
-    for number, sequence in enumerate(np.random.SeedSequence(seed).spawn(repetitions * len(places))):
-        rng = np.random.default_rng(sequence)
-        block, run = divmod(number, len(places))
-        yield {"block": block, "run": run, "location": places[run]}, holder.ball(places[run], rng), rng
+
+    observer: Observer
+    repetitions: int
+    seed: int
+
+    def draw(self, holder: BallHolder = HOLDER) -> Iterator[tuple[dict[str, object], Array, Generator]]:
+        """Yield block, number and location of every run, where the ball is (3,) [m], and the random
+        numbers."""
+        places = [location for location in holder.headings for _ in range(2)]
+        sequences = np.random.SeedSequence(self.seed).spawn(self.repetitions * len(places))
+        for number, rng in enumerate(map(np.random.default_rng, sequences)):
+            block, run = divmod(number, len(places))
+            yield {"block": block, "run": run, "location": places[run]}, holder.ball(places[run], rng), rng
 
 
 def handovers(
     parameters: HandoverParameters,
     plant: HelixPlant,
-    observer: Observer,
-    repetitions: int,
-    seed: int,
+    blocks: Blocks,
     /,
     *,
     guide: Guide | None = None,
@@ -278,11 +276,9 @@ def handovers(
 
     Parameters
     ----------
-    parameters, plant, observer
-        The controller's settings, the arm, and its eyes.
-    repetitions : int
-        Blocks of eight runs, see :func:`trials`.
-    seed : int
+    parameters, plant
+        The controller's settings, and the arm.
+    blocks : Blocks
     guide, step_limit
         As in :func:`run_handover`.
     **labels
@@ -296,14 +292,15 @@ def handovers(
         One row per step: labels, block, run, step and what :class:`HandoverRun` traces.
     """
     controller = HandoverController(parameters)
+    options: dict[str, Any] = {"guide": guide, "step_limit": step_limit}
     runs, traces = [], []
-    for trial, ball, rng in trials(HOLDER, repetitions, seed):
-        result = run_handover(controller, plant, observer, ball, rng, guide=guide, step_limit=step_limit)
+    for trial, ball, rng in blocks.draw():
+        result = run_handover(controller, plant, blocks.observer, ball, rng, **options)
         outcome = {
             "steps": result.steps,
             "closed": result.mode is Mode.GRASP,
             "success": result.success,
-            "miss_mm": 1e3 * result.miss,
+            "miss_mm": result.trace["miss_mm"][-1],
             "overshoot_mm": 1e3 * result.lateral_overshoot,
             "reason": result.reason,
         }
@@ -318,25 +315,19 @@ def thesis_parameters(step_size: float = 0.1, **control: object) -> HandoverPara
     return HandoverParameters(control=VirtualStiffnessController(step_size=step_size, **control))  # type: ignore[arg-type]
 
 
-Settings = Sequence[tuple[dict[str, object], HandoverParameters]]
+Settings = Sequence[tuple[dict[str, Any], HandoverParameters]]
 """What is compared: the controller's settings, each with its labels."""
 
 
 def compare(
-    settings: Settings,
-    plants: Mapping[str, HelixPlant],
-    observer: Observer,
-    repetitions: int,
-    seed: int,
-    /,
-    **options: Any,
+    settings: Settings, plants: Mapping[str, HelixPlant], blocks: Blocks, /, **options: Any
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Return runs and traces of :func:`handovers` on every plant under all settings.
 
     The balls, the noise and the hands are the same under all; `options` go to :func:`handovers`.
     """
     tables = [
-        handovers(parameters, plant, observer, repetitions, seed, plant=name, **options, **labels)
+        handovers(parameters, plant, blocks, plant=name, **options, **labels)
         for name, plant in plants.items()
         for labels, parameters in settings
     ]
@@ -344,19 +335,9 @@ def compare(
     return runs, traces
 
 
-def step_size_experiment(
-    plants: Mapping[str, HelixPlant],
-    observer: Observer,
-    step_sizes: Sequence[float],
-    repetitions: int,
-    seed: int,
-    *,
-    guide: Guide | None = None,
-) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return runs and traces of experiment 1, or of experiment 2 with a guide, on every plant and at every
-    step size."""
-    settings: Settings = [({"alpha": step_size}, thesis_parameters(step_size)) for step_size in step_sizes]
-    return compare(settings, plants, observer, repetitions, seed, guide=guide)
+def by_step_size(step_sizes: Sequence[float]) -> Settings:
+    """Return the settings of experiment 1 and, with a guide, of experiment 2."""
+    return [({"alpha": step_size}, thesis_parameters(step_size)) for step_size in step_sizes]
 
 
 def block_times(runs: pd.DataFrame, timestep: Mapping[float, float]) -> pd.DataFrame:
@@ -365,7 +346,7 @@ def block_times(runs: pd.DataFrame, timestep: Mapping[float, float]) -> pd.DataF
     Parameters
     ----------
     runs : DataFrame
-        Of :func:`step_size_experiment`.
+        Of experiment 1.
     timestep : mapping of float to float
         Duration of a step [s] by step size: the thesis's, a declared input.
 
@@ -387,4 +368,4 @@ def success_over_opening(runs: pd.DataFrame) -> pd.DataFrame:
     """
     table = runs.merge(pd.DataFrame({"opening_mm": OPENINGS_MM}), how="cross")
     table["success"] = table["closed"] & (table["miss_mm"] <= table["opening_mm"])
-    return table.groupby(["plant", "alpha", "opening_mm"], sort=False, as_index=False)["success"].mean()
+    return table.groupby(["plant", "alpha", "opening_mm"], sort=False)["success"].mean().reset_index()

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from soro_lib.papers.soft_handover.beyond import best_controller
-from soro_lib.papers.soft_handover.experiments.handover import Settings, compare, thesis_parameters
+from soro_lib.papers.soft_handover.experiments.handover import Blocks, Settings, compare, thesis_parameters
 from soro_lib.papers.soft_handover.world.observer import RenderedObserver, calibrate_on_box
 from soro_lib.papers.soft_handover.world.plant import HelixPlant
 from soro_lib.papers.soft_handover.world.scene import STEREO
@@ -54,7 +54,7 @@ def rendered_block(
     cameras = calibrate_on_box(STEREO, np.random.default_rng(selection))
     observer = RenderedObserver(HandoverVision(cameras, estimator))
     place_seed = int(places.generate_state(1)[0])
-    tables = compare(settings, {plant_name: plant}, observer, 1, place_seed, estimator=estimator)
+    tables = compare(settings, {plant_name: plant}, Blocks(observer, 1, place_seed), estimator=estimator)
     runs, traces = (table.assign(block=block) for table in tables)
     return runs, traces
 

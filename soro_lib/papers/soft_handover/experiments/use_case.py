@@ -8,11 +8,10 @@ from numpy.random import Generator
 
 from soro_lib.controllers.handover import HandoverController, HandoverParameters, Mode
 from soro_lib.papers.soft_handover.experiments.handover import (
-    HOLDER,
+    Blocks,
     HandoverRun,
     beside_the_gripper,
     run_handover,
-    trials,
 )
 from soro_lib.papers.soft_handover.world.observer import Observer
 from soro_lib.papers.soft_handover.world.plant import Array, HelixPlant
@@ -107,13 +106,7 @@ def carry_and_drop(
 
 
 def use_cases(
-    parameters: HandoverParameters,
-    plant: HelixPlant,
-    observer: Observer,
-    repetitions: int,
-    seed: int,
-    /,
-    **labels: object,
+    parameters: HandoverParameters, plant: HelixPlant, blocks: Blocks, /, **labels: object
 ) -> pd.DataFrame:
     """Repeat the thesis's eight runs of the use case.
 
@@ -125,12 +118,12 @@ def use_cases(
     """
     controller = HandoverController(parameters)
     rows = []
-    for trial, ball, rng in trials(HOLDER, repetitions, seed):
-        handover = run_handover(controller, plant, observer, ball, rng)
+    for trial, ball, rng in blocks.draw():
+        handover = run_handover(controller, plant, blocks.observer, ball, rng)
         row = {**labels, **trial, "taken": handover.success, "dropped": False}
         row |= {"handover_steps": handover.steps, "carry_steps": 0, "bowl_miss_mm": np.nan}
         if handover.success:
-            carry = carry_and_drop(controller, plant, observer, Bowl(), handover, rng)
+            carry = carry_and_drop(controller, plant, blocks.observer, Bowl(), handover, rng)
             row |= {"dropped": carry.dropped, "carry_steps": carry.steps, "bowl_miss_mm": 1e3 * carry.miss}
         rows.append(row)
     return pd.DataFrame(rows)

@@ -11,6 +11,7 @@ itself. 2. Early exit or all iterations, norms or squared norms: what each readi
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -27,11 +28,16 @@ from soro_lib.papers.soft_handover.experiments.handover import (
 )
 from soro_lib.papers.soft_handover.world.plant import HelixPlant
 
-UNWATCHED = SafetyRules(frozen_looks=10**9, patience=10**9)
-"""Safety rules that let a loop stall for as long as it wants."""
-
 NO_FILTER = FilterParameters(*[FilterNoise(1.0, 1e-12)] * 3)
 """Filters that take every measurement as it is."""
+
+
+UNSTOPPED: dict[str, Any] = {
+    "stop_threshold": 1e-9,
+    "filters": NO_FILTER,
+    "safety": SafetyRules(frozen_looks=10**9, patience=10**9),
+}
+"""Settings that let a loop stall for as long as it wants."""
 
 
 def loop_variants(step_size: float) -> dict[str, HandoverParameters]:
@@ -96,8 +102,7 @@ def error_floor(
     for loop, step_size, bound in product(
         ("all 20 iterations", "early exit", "no error floor"), step_sizes, pose_bounds
     ):
-        unstopped = {"stop_threshold": 1e-9, "filters": NO_FILTER, "safety": UNWATCHED}
-        parameters = replace(loop_variants(step_size)[loop], pose_bound=bound, **unstopped)
+        parameters = replace(loop_variants(step_size)[loop], pose_bound=bound, **UNSTOPPED)
         run = still_handover(parameters, plant, "front", steps)
         floor = run.trace["error_mm"][-20:].mean()
         rows.append((loop, step_size, 1e3 * bound, floor, 1e3 * bound / step_size))

@@ -180,9 +180,10 @@ def look_errors(
     missing = np.full(3, np.nan)
     points = SCENE.arm.tip_points(state)
     axis = (points[3:] - points[:3]) / SCENE.arm.gripper_length
-    known = wrist is not None and wrist.wrist is not None and wrist.direction is not None
-    wrist_error = 1e3 * (wrist.wrist - points[:3]) if known else missing
-    turn = wrist.direction - axis if known else missing
+    wrist_error, turn, claimed = missing, missing, np.nan
+    if wrist is not None and wrist.wrist is not None and wrist.direction is not None:
+        wrist_error, turn = 1e3 * (wrist.wrist - points[:3]), wrist.direction - axis
+        claimed = 1e3 * wrist.wrist_deviation
     gripper_error = wrist_error + 1e3 * SCENE.arm.gripper_length * turn
     ball_error = missing if seen.ball is None else 1e3 * (seen.ball - ball)
     return {
@@ -190,7 +191,7 @@ def look_errors(
         "wrist_mm": float(np.linalg.norm(wrist_error)),
         **{f"direction_{name}": value for name, value in zip("xyz", turn)},
         "direction_deg": float(np.rad2deg(2 * np.arcsin(np.linalg.norm(turn) / 2))),
-        "claimed_mm": 1e3 * wrist.wrist_deviation if known else np.nan,
+        "claimed_mm": claimed,
         "gripper_mm": float(np.linalg.norm(gripper_error)),
         **{f"ball_{name}_mm": value for name, value in zip("xyz", ball_error)},
         "ball_mm": float(np.linalg.norm(ball_error)),

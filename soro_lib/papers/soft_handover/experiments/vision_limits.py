@@ -38,8 +38,8 @@ def occlusion(count: int, seed: int) -> pd.DataFrame:
         claimed_mm.
     """
     rows = []
-    for pose, rng in vision.poses(count, seed):
-        case = hidden_ball(pose, rng)
+    for pose in range(count):
+        case = hidden_ball(pose, seed)
         for rule, estimator in BALL_RULES.items():
             seen = HandoverVision(case.cameras, estimator, track=False).look(case.pictures).observation
             errors = vision.look_errors(case.state, case.ball, seen, None)
@@ -69,8 +69,9 @@ class HiddenBall(NamedTuple):
     visible: float
 
 
-def hidden_ball(pose: int, rng: Generator) -> HiddenBall:
+def hidden_ball(pose: int, seed: int) -> HiddenBall:
     """Return one of the balls of :func:`occlusion`; every odd one lies between the fingers."""
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(pose,)))
     state = vision.random_states(1, rng)[0]
     gripper = SCENE.arm.tip_points(state)[3:]
     ball = gripper + 0.010 * rng.standard_normal(3) if pose % 2 else vision.ball_before(gripper, rng)
@@ -78,11 +79,6 @@ def hidden_ball(pose: int, rng: Generator) -> HiddenBall:
     pictures = photographs(SCENE.items(state, ball), STEREO, WEBCAM, rng)
     visible = min(visible_share(state, ball, view) for view in STEREO)
     return HiddenBall(state, ball, cameras, pictures, visible)
-
-
-def stored_hidden_ball(pose: int, seed: int) -> HiddenBall:
-    """Return a ball of the recording by its number."""
-    return hidden_ball(pose, np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(pose,))))
 
 
 def visible_share(state: Array, ball: Array, view: CalibratedCamera) -> float:

@@ -114,8 +114,13 @@ def fig13_use_case(arm: HelixArm, run: HandoverRun, carry: Carry, release: Array
     heading = np.array([1.0, 0.0])
     in_gripper = run.ball - arm.tip_points(run.state)[3:]
     bowl = side_view(release[None] + [0, 0, 0.08], heading) + BOWL
-    moments = {"start": (run, 0), "taken": (run, -1), "on the way": (carry, carry.steps // 3)}
-    for axes, (title, (part, step)) in zip(panels, [*moments.items(), ("let go", (carry, -1))]):
+    moments: dict[str, tuple[HandoverRun | Carry, int]] = {
+        "start": (run, 0),
+        "taken": (run, -1),
+        "on the way": (carry, carry.steps // 3),
+        "let go": (carry, -1),
+    }
+    for axes, (title, (part, step)) in zip(panels, moments.items()):
         state = part.states[step]
         ball = run.ball if title == "start" else arm.tip_points(state)[3:] + in_gripper
         draw_moment(axes, arm, heading, {"commanded": part.commands[step], "true": state}, ball, 7)
@@ -375,7 +380,7 @@ def filter_cap(runs: pd.DataFrame, poles: pd.DataFrame) -> Figure:
     medians = runs.groupby(["filters", "alpha"], sort=False)[["steps", "overshoot_mm"]].median()
     for color, filters in zip(SERIES, runs["filters"].unique()):
         for axes, column in zip(panels, medians):
-            axes.plot(medians.loc[filters, column], color=color, marker="o", label=filters)
+            axes.plot(medians.loc[filters][column], color=color, marker="o", label=filters)
         pole = poles[poles["filters"] == filters]
         panels[2].plot(pole["step_gain"], pole["pole"], color=color, label=filters)
     panels[0].set_ylim(bottom=0)

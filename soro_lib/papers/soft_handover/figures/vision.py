@@ -221,7 +221,7 @@ def image_faults(table: pd.DataFrame, estimators: Sequence[str] = ("thesis", "jo
             stacked_shares(axes, rows["fault"], rows[what], VERDICT_COLORS, **style)
         label_axes(axes, "share of the looks [%]", title=what)
         axes.grid(False)
-    name_rows(panels[0], table["fault"].unique())
+    name_rows(panels[0], list(table["fault"].unique()))
     patch_legend(figure, VERDICT_COLORS, f"pale: {estimators[0]}, full: {estimators[1]}")
     return figure
 

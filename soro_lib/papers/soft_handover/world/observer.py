@@ -32,11 +32,9 @@ class Observer(Protocol):
 
     def observe(self, state: Array, ball: Array, rng: Generator) -> HandoverObservation:
         """Return what is seen of the true state q (9,) and the true ball (3,) [m]."""
-        ...
 
     def reset(self) -> None:
         """Forget earlier looks."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -67,11 +67,10 @@ class HoldingHand:
 
 
 class HelixPlant(Protocol):
-    """What a simulated arm offers to a study; one that derives from it has neither memory nor weight."""
+    """What a simulated arm offers to a study."""
 
     def settle(self, tendon_lengths: ArrayLike, hand: HoldingHand | None = None) -> Array:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m]."""
-        ...
 
     def carry(self, mass: float) -> None:
         """Hang a mass [kg] into the gripper."""
@@ -107,7 +106,7 @@ class Stiffness:
 
 
 @dataclass
-class AngleLossPlant(HelixPlant):
+class AngleLossPlant:
     """Plant K: every segment realises a fixed share of its commanded bending angle, and its length in full.
 
     Gravity straightens a hanging arm; that is all this plant knows of it. The shares have no printed value:
@@ -131,6 +130,12 @@ class AngleLossPlant(HelixPlant):
             raise ValueError(f"realised must be three shares in (0, 1], got {self.realised}")
         self._shares = np.stack([self.realised, self.realised, np.ones(3)], axis=-1).ravel()
 
+    def reset(self) -> None:
+        """Forget nothing: this plant has no memory."""
+
+    def carry(self, mass: float) -> None:
+        """Take a mass [kg] without any effect: this plant knows no weight."""
+
     def settle(self, tendon_lengths: ArrayLike, hand: HoldingHand | None = None) -> Array:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m].
 
@@ -148,16 +153,11 @@ def held_state(free: Array, stiffness: Array, held: Array, grip: float, gripper_
     """Return the state of least ``(q - free)' K (q - free) + grip |f(q) - held|^2``, by Gauss-Newton."""
     q = free.copy()
     for _ in range(50):
-        gradient, hessian = np.empty(9), np.zeros((9, 9))
-        for i in range(9):
-            gradient[i] = stiffness[i] * (q[i] - free[i])
-            hessian[i, i] = stiffness[i]
+        gradient, hessian = stiffness * (q - free), np.diag(stiffness)
         add_grip(gradient, hessian, q, held, grip, gripper_length)
         step = cholesky_solve(cholesky(hessian), gradient)
         longest = largest(step)
-        share = min(1.0, LONGEST_NEWTON_STEP / longest)
-        for i in range(9):
-            q[i] -= share * step[i]
+        q -= min(1.0, LONGEST_NEWTON_STEP / longest) * step
         if longest < EQUILIBRIUM_TOLERANCE:
             break
     return q
@@ -169,14 +169,8 @@ def add_grip(
 ) -> None:
     """Add the slopes of ``grip |f(q) - held|^2 / 2`` to a gradient (9,) and a Hessian (9, 9), in place."""
     points, jacobian = tip_points_and_jacobian(q, gripper_length)
-    for k in range(6):
-        points[k] -= held[k]
-    pull = multiply(jacobian.T, points)
-    curvature = outer_gram(jacobian.T)
-    for i in range(9):
-        gradient[i] += grip * pull[i]
-        for j in range(9):
-            hessian[i, j] += grip * curvature[i, j]
+    gradient += grip * multiply(jacobian.T, points - held)
+    hessian += grip * outer_gram(jacobian.T)
 
 
 @dataclass

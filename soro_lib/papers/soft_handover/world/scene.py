@@ -41,38 +41,41 @@ SLEEVE: Color = (120, 70, 60)
 BALL: Color = (60, 175, 50)
 DULL_GREEN: Color = (88, 118, 92)
 
+Span = tuple[float, float]
+
+BALL_RADIUS = 0.020
+"""Radius of the green ball [m]."""
+
 
 def aimed(position: ArrayLike, target: ArrayLike, camera: Camera = BRIO) -> CalibratedCamera:
     """Return an upright camera at ``position`` aimed at ``target``, both (3,) [m] in `arm_base`."""
     return CalibratedCamera(camera, look_at(position, target, UP))
 
 
-def stereo_pair(
-    baseline: float = 0.5, distance: float = 0.75, toe_in: float = 0.5, camera: Camera = BRIO
-) -> tuple[CalibratedCamera, CalibratedCamera]:
+BASELINE, DISTANCE, HEIGHT = 0.5, 0.75, 0.62
+"""Of the cameras from each other, which the thesis prints, from the hanging arm and below its base [m]."""
+
+
+def stereo_pair(toe_in: float = 0.5, camera: Camera = BRIO) -> tuple[CalibratedCamera, CalibratedCamera]:
     """Return the left and the right camera, as seen from behind them.
 
     Parameters
     ----------
-    baseline : float
-        Distance of the cameras from each other [m]; the thesis prints about 0.5.
-    distance : float
-        From the hanging arm, along y [m].
     toe_in : float
         0 for parallel cameras, 1 for cameras aimed at the hanging arm.
     camera : Camera
     """
-    height = 0.62
-    return tuple(  # type: ignore[return-value]
-        aimed((x, distance, height), ((1 - toe_in) * x, 0.0, height), camera)
-        for x in (-baseline / 2, baseline / 2)
+    left, right = (
+        aimed((x, DISTANCE, HEIGHT), ((1 - toe_in) * x, 0.0, HEIGHT), camera)
+        for x in (-BASELINE / 2, BASELINE / 2)
     )
+    return left, right
 
 
 STEREO = stereo_pair()
 """The cameras of the replication, half toed in, so that both see where the thesis's four locations are."""
 
-SIDE_CAMERA = aimed((0.80, -0.05, 0.62), (0.0, -0.05, 0.62))
+SIDE_CAMERA = aimed((0.80, -0.05, HEIGHT), (0.0, -0.05, HEIGHT))
 """A third camera, which looks at the arm from the right."""
 
 
@@ -103,13 +106,10 @@ class HandoverScene:
     ----------
     arm : HelixArm
     ring : MarkerRing
-    ball_radius : float
-        Radius of the green ball [m].
     """
 
     arm: HelixArm = field(default_factory=HelixArm)
     ring: MarkerRing = field(default_factory=MarkerRing)
-    ball_radius: float = 0.020
 
     def items(self, state: ArrayLike, ball: ArrayLike, extras: Extras | None = None) -> list[Drawable]:
         """Return everything to draw for a true state q (9,) and a true ball (3,) [m].
@@ -154,9 +154,8 @@ class HandoverScene:
 
     def _gripper(self, wrist: Array) -> list[Drawable]:
         """Return the palm and three open fingers."""
-        below = self.ring.height / 2
         length = self.arm.gripper_length
-        palm = np.array([(0, 0, below), (0, 0, 0.42 * length)])
+        palm = np.array([(0, 0, self.ring.height / 2), (0, 0, 0.42 * length)])
         parts: list[Drawable] = [Tube(transform_points(wrist, palm), 0.024, (PLASTIC,))]
         along = np.array([0.38, 0.6, 0.82, 1.05]) * length
         outward = np.array([0.022, 0.040, 0.042, 0.034])
@@ -167,9 +166,7 @@ class HandoverScene:
 
     def ball(self, centre: Array) -> Sphere:
         """Return the green ball with its middle at a point (3,) [m]."""
-        return Sphere(
-            centre, self.ball_radius, BALL, to_light=(0.3, 0.5, -1.0), ambient=0.55, supersampling=2
-        )
+        return Sphere(centre, BALL_RADIUS, BALL, to_light=(0.3, 0.5, -1.0), ambient=0.55, supersampling=2)
 
     def _hand(self, ball: Array) -> list[Drawable]:
         """Return a palm under the ball, fingers and a forearm that comes from outside and below."""
@@ -178,7 +175,7 @@ class HandoverScene:
         away = away / norm if norm > 1e-6 else np.array([1.0, 0.0, 0.0])
         sideways = np.cross(away, UP)
         down = -np.array(UP)
-        palm = ball + (self.ball_radius + 0.014) * down
+        palm = ball + (BALL_RADIUS + 0.014) * down
         wrist = palm + 0.075 * away + 0.012 * down
         hand = np.array([palm - 0.03 * away, palm, palm + 0.045 * away, wrist])
         forearm = np.array([wrist, wrist + 0.10 * away + 0.03 * down])
@@ -207,7 +204,7 @@ def _room(camera: Camera, pose: bytes) -> Image:
     def wall(corners: ArrayLike, color: Color, layer: int) -> Polygon:
         return Polygon(np.array(corners, dtype=float), color, layer)
 
-    def upright(width: ArrayLike, y: float, height: ArrayLike, color: Color, layer: int) -> Polygon:
+    def upright(width: Span, y: float, height: Span, color: Color, layer: int) -> Polygon:
         (left, right), (top, bottom) = width, height
         return wall([(left, y, top), (right, y, top), (right, y, bottom), (left, y, bottom)], color, layer)
 

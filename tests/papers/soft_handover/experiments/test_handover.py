@@ -20,12 +20,12 @@ PLANTS = {"K": plant_k(), "E": ElasticPlant()}
 
 
 def test_same_seed_same_runs_whatever_ran_before():
-    first = handover.handovers(handover.thesis_parameters(0.4), PLANTS["E"], EYES, 1, 7)
-    handover.handovers(handover.thesis_parameters(0.2), PLANTS["E"], EYES, 1, 8)
-    second = handover.handovers(handover.thesis_parameters(0.4), PLANTS["E"], EYES, 1, 7)
+    first = handover.handovers(handover.thesis_parameters(0.4), PLANTS["E"], handover.Blocks(EYES, 1, 7))
+    handover.handovers(handover.thesis_parameters(0.2), PLANTS["E"], handover.Blocks(EYES, 1, 8))
+    second = handover.handovers(handover.thesis_parameters(0.4), PLANTS["E"], handover.Blocks(EYES, 1, 7))
     pd.testing.assert_frame_equal(first[0], second[0])
     pd.testing.assert_frame_equal(first[1], second[1])
-    longer = handover.handovers(handover.thesis_parameters(0.4), PLANTS["E"], EYES, 2, 7)[0]
+    longer = handover.handovers(handover.thesis_parameters(0.4), PLANTS["E"], handover.Blocks(EYES, 2, 7))[0]
     pd.testing.assert_frame_equal(first[0], longer.iloc[:8])
 
 
@@ -39,11 +39,14 @@ def test_success_is_judged_by_the_true_ball_in_the_true_gripper():
         assert run.mode is Mode.GRASP
         assert run.success is caught
         assert run.success == Gripper().holds(ARM.tip_points(run.state), run.ball)
-        assert run.miss == pytest.approx(np.linalg.norm(ARM.tip_points(run.state)[3:] - run.ball))
+        miss = np.linalg.norm(ARM.tip_points(run.state)[3:] - run.ball)
+        assert run.trace["miss_mm"][-1] == pytest.approx(1e3 * miss)
 
 
 def test_traces_have_one_row_per_look():
-    runs, traces = handover.handovers(handover.thesis_parameters(0.4), PLANTS["K"], EYES, 1, 1, plant="K")
+    runs, traces = handover.handovers(
+        handover.thesis_parameters(0.4), PLANTS["K"], handover.Blocks(EYES, 1, 1), plant="K"
+    )
     assert traces.groupby("run")["step"].max().tolist() == runs["steps"].tolist()
     gaps = {"commanded_gap_mm", "estimated_gap_mm", "estimate_residual_mm", "miss_mm", "descending"}
     assert {"error_mm", "measured_mm", "commanded_mm", "estimated_mm", "true_mm"} | gaps <= set(traces)
@@ -60,7 +63,7 @@ def test_block_times_are_those_of_the_runs():
 
 
 def test_a_wider_gripper_never_catches_less():
-    runs = handover.handovers(handover.thesis_parameters(0.4), PLANTS["E"], EYES, 1, 1, plant="E", alpha=0.4)[
-        0
-    ]
+    runs = handover.handovers(
+        handover.thesis_parameters(0.4), PLANTS["E"], handover.Blocks(EYES, 1, 1), plant="E", alpha=0.4
+    )[0]
     assert handover.success_over_opening(runs)["success"].is_monotonic_increasing

@@ -10,6 +10,8 @@ PLANTS = {"K": plant_k(), "E": ElasticPlant()}
 
 
 def test_the_ball_is_carried_to_the_bowl():
-    runs = use_case.use_cases(handover.thesis_parameters(0.2), PLANTS["K"], EYES, 1, 1, plant="K")
+    runs = use_case.use_cases(
+        handover.thesis_parameters(0.2), PLANTS["K"], handover.Blocks(EYES, 1, 1), plant="K"
+    )
     assert runs["dropped"].sum() >= 7
     assert (runs.loc[runs["dropped"], "bowl_miss_mm"] <= 60).all()
