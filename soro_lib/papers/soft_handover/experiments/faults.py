@@ -16,14 +16,8 @@ from numpy.random import Generator
 
 from soro_lib.controllers.handover import UP, HandoverController, HandoverParameters, Mode, goal_over
 from soro_lib.controllers.virtual_stiffness import within_limits
-from soro_lib.papers.soft_handover.experiments.handover import (
-    HOLDER,
-    BallHolder,
-    Blocks,
-    Guide,
-    HandoverRun,
-    run_handover,
-)
+from soro_lib.papers.soft_handover.experiments import handover
+from soro_lib.papers.soft_handover.experiments.handover import BallHolder
 from soro_lib.papers.soft_handover.world.observer import Observer
 from soro_lib.papers.soft_handover.world.plant import Array, HelixPlant, HoldingHand
 from soro_lib.poses import magnitude
@@ -82,9 +76,9 @@ class Fault:
     name: str
     severity: str
     change: Change = lambda look, step, rng: look
-    holder: BallHolder = HOLDER
+    holder: BallHolder = handover.HOLDER
     motors: TendonMotors = field(default_factory=TendonMotors)
-    guide: Guide | None = None
+    guide: handover.Guide | None = None
 
 
 Distortion = Callable[[HandoverObservation, Generator], HandoverObservation]
@@ -183,7 +177,7 @@ def noise_times(factor: float) -> Change:
     return always(distort)
 
 
-def pushed_away(distance: float, gripper_length: float = 0.10) -> Guide:
+def pushed_away(distance: float, gripper_length: float = 0.10) -> handover.Guide:
     """Hold the arm a distance [m] away from the ball for ten steps."""
 
     def guide(step: int, gripper: Array, ball: Array) -> HoldingHand | None:
@@ -202,8 +196,8 @@ def all_faults() -> list[Fault]:
     def in_a_share(name: str, distort: Distortion, shares: Sequence[float]) -> list[Fault]:
         return [Fault(name, f"{100 * share:.0f} %", sometimes(share, distort)) for share in shares]
 
-    def motors(range_: float) -> TendonMotors:
-        return TendonMotors(shortest=(-range_,) * 9, longest=(range_,) * 9)
+    def motors(travel: float) -> TendonMotors:
+        return TendonMotors(shortest=(-travel,) * 9, longest=(travel,) * 9)
 
     return [
         Fault("none", "-"),
@@ -225,7 +219,7 @@ def all_faults() -> list[Fault]:
 def run_faults(
     parameters: HandoverParameters,
     plant: HelixPlant,
-    blocks: Blocks,
+    blocks: handover.Blocks,
     faults: Sequence[Fault],
     /,
     *,
@@ -244,12 +238,12 @@ def run_faults(
         options: dict[str, Any] = {"holder": fault.holder, "guide": fault.guide, "step_limit": step_limit}
         names = {**labels, "fault": fault.name, "severity": fault.severity}
         for _, ball, rng in blocks.draw(fault.holder):
-            run = run_handover(controller, plant, eyes, ball, rng, **options)
+            run = handover.run_handover(controller, plant, eyes, ball, rng, **options)
             rows.append({**names, "outcome": outcome(run), "violations": violations(run, fault.motors)})
     return pd.DataFrame(rows)
 
 
-def violations(run: HandoverRun, motors: TendonMotors) -> int:
+def violations(run: handover.HandoverRun, motors: TendonMotors) -> int:
     """Return how many commands of a run were outside the limits of arm and motors, or not finite."""
     return sum(
         not (np.all((motors.shortest <= change) & (change <= motors.longest)) and within_limits(q_sys))
@@ -257,7 +251,7 @@ def violations(run: HandoverRun, motors: TendonMotors) -> int:
     )
 
 
-def outcome(run: HandoverRun) -> str:
+def outcome(run: handover.HandoverRun) -> str:
     """Return what a run came to."""
     if run.success:
         return "handover"

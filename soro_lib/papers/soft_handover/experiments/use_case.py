@@ -7,12 +7,7 @@ import pandas as pd
 from numpy.random import Generator
 
 from soro_lib.controllers.handover import HandoverController, HandoverParameters, Mode
-from soro_lib.papers.soft_handover.experiments.handover import (
-    Blocks,
-    HandoverRun,
-    beside_the_gripper,
-    run_handover,
-)
+from soro_lib.papers.soft_handover.experiments import handover
 from soro_lib.papers.soft_handover.world.observer import Observer
 from soro_lib.papers.soft_handover.world.plant import Array, HelixPlant
 
@@ -43,7 +38,7 @@ class Bowl:
     @property
     def release_point(self) -> Array:
         """Gripper point (3,) [m] over the bowl."""
-        return beside_the_gripper(self.heading, self.lateral, self.height)
+        return handover.beside_the_gripper(self.heading, self.lateral, self.height)
 
     def off_centre(self, ball: Array) -> float:
         """Return the horizontal distance of a ball (3,) from the middle of the bowl [m]."""
@@ -81,14 +76,14 @@ def carry_and_drop(
     plant: HelixPlant,
     observer: Observer,
     bowl: Bowl,
-    handover: HandoverRun,
+    taken: handover.HandoverRun,
     rng: Generator,
     step_limit: int = 300,
 ) -> Carry:
     """Carry a ball that was taken to the bowl and let it go there."""
     arm = controller.arm
     motors = controller.parameters.motors
-    in_gripper = handover.ball - arm.tip_points(handover.state)[3:]
+    in_gripper = taken.ball - arm.tip_points(taken.state)[3:]
     controller.carry_to(bowl.release_point)
     plant.carry(bowl.ball_mass)
     state = plant.settle(motors.pull(arm.tendon_lengths(controller.q_sys) - arm.tendon_lengths(arm.home)))
@@ -106,7 +101,7 @@ def carry_and_drop(
 
 
 def use_cases(
-    parameters: HandoverParameters, plant: HelixPlant, blocks: Blocks, /, **labels: object
+    parameters: HandoverParameters, plant: HelixPlant, blocks: handover.Blocks, /, **labels: object
 ) -> pd.DataFrame:
     """Repeat the thesis's eight runs of the use case.
 
@@ -119,11 +114,11 @@ def use_cases(
     controller = HandoverController(parameters)
     rows = []
     for trial, ball, rng in blocks.draw():
-        handover = run_handover(controller, plant, blocks.observer, ball, rng)
-        row = {**labels, **trial, "taken": handover.success, "dropped": False}
-        row |= {"handover_steps": handover.steps, "carry_steps": 0, "bowl_miss_mm": np.nan}
-        if handover.success:
-            carry = carry_and_drop(controller, plant, blocks.observer, Bowl(), handover, rng)
+        run = handover.run_handover(controller, plant, blocks.observer, ball, rng)
+        row = {**labels, **trial, "taken": run.success, "dropped": False}
+        row |= {"handover_steps": run.steps, "carry_steps": 0, "bowl_miss_mm": np.nan}
+        if run.success:
+            carry = carry_and_drop(controller, plant, blocks.observer, Bowl(), run, rng)
             row |= {"dropped": carry.dropped, "carry_steps": carry.steps, "bowl_miss_mm": 1e3 * carry.miss}
         rows.append(row)
     return pd.DataFrame(rows)

@@ -20,12 +20,8 @@ from soro_lib.controllers.handover import HandoverParameters, Mode, SafetyRules
 from soro_lib.controllers.virtual_stiffness import state_limits
 from soro_lib.estimators.handover_filters import APPENDIX_A, FilterNoise, FilterParameters
 from soro_lib.estimators.shape_estimation import estimate_shape
-from soro_lib.papers.soft_handover.experiments.handover import (
-    BallHolder,
-    Settings,
-    still_handover,
-    thesis_parameters,
-)
+from soro_lib.papers.soft_handover.experiments import handover
+from soro_lib.papers.soft_handover.experiments.handover import Settings, thesis_parameters
 from soro_lib.papers.soft_handover.world.plant import HelixPlant
 
 NO_FILTER = FilterParameters(*[FilterNoise(1.0, 1e-12)] * 3)
@@ -103,7 +99,7 @@ def error_floor(
         ("all 20 iterations", "early exit", "no error floor"), step_sizes, pose_bounds
     ):
         parameters = replace(loop_variants(step_size)[loop], pose_bound=bound, **UNSTOPPED)
-        run = still_handover(parameters, plant, "front", steps)
+        run = handover.still_handover(parameters, plant, "front", steps)
         floor = run.trace["error_mm"][-20:].mean()
         rows.append((loop, step_size, 1e3 * bound, floor, 1e3 * bound / step_size))
     return pd.DataFrame(rows, columns=["loop", "alpha", "pose_bound_mm", "floor_mm", "predicted_mm"])
@@ -188,7 +184,7 @@ def reach_by_heading(
     """
     rows = []
     for (name, plant), heading, lateral in product(plants.items(), (0.0, 180.0), laterals):
-        holder = BallHolder(lateral, headings={"ball": heading}, placement_deviation=0.0, sway=0.0)
-        run = still_handover(thesis_parameters(0.4), plant, "ball", step_limit, holder)
+        holder = handover.BallHolder(lateral, headings={"ball": heading}, placement_deviation=0.0, sway=0.0)
+        run = handover.still_handover(thesis_parameters(0.4), plant, "ball", step_limit, holder)
         rows.append((name, heading, 1e3 * lateral, run.steps, run.mode is Mode.GRASP))
     return pd.DataFrame(rows, columns=["plant", "heading_deg", "lateral_mm", "steps", "closed"])
