@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from soro_lib.controllers.handover import HandoverParameters
 from soro_lib.controllers.virtual_stiffness import state_limits
 from soro_lib.papers.soft_handover.experiments.handover import STEP_SIZES, block_times
+from soro_lib.papers.soft_handover.experiments.vision import HIDDEN, SCENE
+from soro_lib.papers.soft_handover.world.scene import STEREO
 from soro_lib.replication.findings import Finding
 
 Samples = NDArray[np.float64]
@@ -281,3 +283,51 @@ def definition_findings() -> dict[str, Finding]:
     for name, three in segments.items():
         values |= {f"{name}_{number}": value for number, value in enumerate(three, start=1)}
     return {name: Finding(value) for name, value in values.items()}
+
+
+BLOCK = 20
+"""Poses that share one vote on a claim."""
+
+
+def vision_findings(
+    accuracy_table: pd.DataFrame, hidden: pd.DataFrame, places: pd.DataFrame
+) -> dict[str, Finding]:
+    """Return the findings of the vision study, keyed by the id of the published row.
+
+    Parameters
+    ----------
+    accuracy_table : DataFrame
+        Of :func:`soro_lib.papers.soft_handover.experiments.vision.accuracy`.
+    hidden : DataFrame
+        Of :func:`soro_lib.papers.soft_handover.experiments.vision_limits.occlusion`.
+    places : DataFrame
+        Of :func:`soro_lib.papers.soft_handover.experiments.vision_limits.workspace_limits`.
+    """
+    left, right = (view.pose[:3, 3] for view in STEREO)
+    ball = accuracy_table[accuracy_table["estimator"] == "joint"].pivot(
+        index="pose", columns="condition", values="ball_mm"
+    )
+    typical = ball.groupby(ball.index // BLOCK).median()
+    largest = hidden[hidden["rule"] == "largest piece"]
+    errors = largest.assign(hidden=largest["visible"] < HIDDEN, block=largest["pose"] // BLOCK)
+    medians = by_block(errors, "hidden", "ball_mm").dropna()
+    worst = {bool(key): group.quantile(0.95) for key, group in errors.groupby("hidden")["ball_mm"]}
+    default = places[(places["field_of_view"] == "78 deg") & (places["limit"] != "")]
+    parallel = default[default["cameras"] != "aimed at the arm"]
+    return {
+        "s32_baseline": Finding(float(np.linalg.norm(left - right))),
+        "s324_marker_size": Finding(1e3 * SCENE.ring.marker),
+        "s54_third_camera_better": Finding(
+            (typical["three cameras"] < typical["all causes"]).astype(float),
+            f"median {ball['all causes'].median():.2f} mm with two cameras, "
+            f"{ball['three cameras'].median():.2f} mm with a third from the side, in blocks of {BLOCK} poses",
+        ),
+        "fig15_occlusion_hurts": Finding(
+            (medians[True] > medians[False]).astype(float),
+            f"95th percentile {worst[True]:.1f} mm hidden, {worst[False]:.1f} mm not hidden",
+        ),
+        "fig14_side_limits": Finding(
+            (parallel["limit"] == "right").astype(float),
+            "for parallel and half toed-in cameras; cameras aimed at the arm reverse it",
+        ),
+    }

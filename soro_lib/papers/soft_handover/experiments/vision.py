@@ -17,7 +17,6 @@ from soro_lib.papers.soft_handover.world.plant import Array
 from soro_lib.papers.soft_handover.world.scene import SIDE_CAMERA, STEREO, WEBCAM, HandoverScene, photographs
 from soro_lib.project import data_directory
 from soro_lib.replication.datacards import verified
-from soro_lib.replication.findings import Finding
 from soro_lib.sensing.handover_observation import HandoverObservation
 from soro_lib.sensing.handover_vision import ESTIMATORS, HandoverVision, Look
 from soro_lib.sensing.marker_pose import WristPose, average_pose, wrist_candidates
@@ -272,51 +271,3 @@ def noise_figures(still: pd.DataFrame, hidden: pd.DataFrame) -> dict[str, dict[s
         balls = covered[columns["ball"][0]].to_numpy()
         budget["occluded_ball"] = 1e-3 * float(np.sqrt(np.nanmean(balls**2)))
     return figures
-
-
-BLOCK = 20
-"""Poses that share one vote on a claim."""
-
-
-def vision_findings(
-    accuracy_table: pd.DataFrame, hidden: pd.DataFrame, places: pd.DataFrame
-) -> dict[str, Finding]:
-    """Return the findings of the vision study, keyed by the id of the published row.
-
-    Parameters
-    ----------
-    accuracy_table : DataFrame
-        Of :func:`accuracy`.
-    hidden : DataFrame
-        Of :func:`soro_lib.papers.soft_handover.experiments.vision_limits.occlusion`.
-    places : DataFrame
-        Of :func:`soro_lib.papers.soft_handover.experiments.vision_limits.workspace_limits`.
-    """
-    left, right = (view.pose[:3, 3] for view in STEREO)
-    ball = accuracy_table[accuracy_table["estimator"] == "joint"].pivot(
-        index="pose", columns="condition", values="ball_mm"
-    )
-    by_block = ball.groupby(ball.index // BLOCK).median()
-    largest = hidden[hidden["rule"] == "largest piece"]
-    errors = largest.assign(hidden=largest["visible"] < HIDDEN, block=largest["pose"] // BLOCK)
-    medians = errors.pivot_table(index="block", columns="hidden", values="ball_mm", aggfunc="median").dropna()
-    worst = {bool(key): group.quantile(0.95) for key, group in errors.groupby("hidden")["ball_mm"]}
-    default = places[(places["field_of_view"] == "78 deg") & (places["limit"] != "")]
-    parallel = default[default["cameras"] != "aimed at the arm"]
-    return {
-        "s32_baseline": Finding(float(np.linalg.norm(left - right))),
-        "s324_marker_size": Finding(1e3 * SCENE.ring.marker),
-        "s54_third_camera_better": Finding(
-            (by_block["three cameras"] < by_block["all causes"]).astype(float),
-            f"median {ball['all causes'].median():.2f} mm with two cameras, "
-            f"{ball['three cameras'].median():.2f} mm with a third from the side, in blocks of {BLOCK} poses",
-        ),
-        "fig15_occlusion_hurts": Finding(
-            (medians[True] > medians[False]).astype(float),
-            f"95th percentile {worst[True]:.1f} mm hidden, {worst[False]:.1f} mm not hidden",
-        ),
-        "fig14_side_limits": Finding(
-            (parallel["limit"] == "right").astype(float),
-            "for parallel and half toed-in cameras; cameras aimed at the arm reverse it",
-        ),
-    }
