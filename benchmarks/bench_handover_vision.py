@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.run import Row, compare, seconds_per_call
 from soro_lib.controllers.handover import HandoverController
 from soro_lib.papers.soft_handover.calibration import plant_k
-from soro_lib.papers.soft_handover.experiments.handover import Scene, thesis_parameters
+from soro_lib.papers.soft_handover.experiments.handover import HOLDER, thesis_parameters
 from soro_lib.papers.soft_handover.world.observer import RenderedObserver
 from soro_lib.papers.soft_handover.world.scene import STEREO, WEBCAM, HandoverScene, photograph
 from soro_lib.sensing.handover_vision import HandoverVision
@@ -85,7 +85,7 @@ def handover_step() -> Row:
     for _ in range(HANDOVERS):
         for part in (controller, vision, plant):
             part.reset()
-        ball = Scene().ball("front", scene.arm.tip_points(scene.arm.home)[3:], rng)
+        ball = HOLDER.ball("front", rng)
         state = plant.settle(calibrated)
         for _ in range(STEPS):
             marks = [time.process_time()]

@@ -18,7 +18,7 @@ from soro_lib.estimators import estimate_shape
 from soro_lib.estimators.handover_filters import MEASURED_NOISE, FilterNoise, HandoverFilters
 from soro_lib.estimators.shape_estimation import estimate_shape_by_slsqp
 from soro_lib.papers.soft_handover.calibration import plant_k
-from soro_lib.papers.soft_handover.experiments.handover import Scene, handovers, thesis_parameters
+from soro_lib.papers.soft_handover.experiments.handover import HOLDER, Blocks, handovers, thesis_parameters
 from soro_lib.papers.soft_handover.world.observer import NoisyObserver, load_vision_noise
 from soro_lib.papers.soft_handover.world.plant import ElasticPlant
 from soro_lib.robots import HelixArm
@@ -134,7 +134,7 @@ def control_step() -> Row:
     for _ in range(20):
         for part in (controller, eyes, plant):
             part.reset()
-        ball = Scene().ball("front", ARM.tip_points(ARM.home)[3:], rng)
+        ball = HOLDER.ball("front", rng)
         state = plant.settle(calibrated)
         for _ in range(60):
             look = eyes.observe(state, ball, rng)
@@ -168,5 +168,5 @@ def equilibrium() -> Row:
 def handovers_per_minute() -> Row:
     """Time two hundred whole handovers on plant K at step size 0.1, the slowest."""
     start = time.process_time()
-    handovers(thesis_parameters(0.1), plant_k(), NoisyObserver(load_vision_noise("thesis")), 25, 1)
+    handovers(thesis_parameters(0.1), plant_k(), Blocks(NoisyObserver(load_vision_noise("thesis")), 25, 1))
     return Row("200 handovers without rendering", time.process_time() - start, "s", "one core", None, 60.0)

@@ -12,10 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from soro_lib.controllers.handover import HandoverController, HandoverParameters
-from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
-from soro_lib.papers.soft_handover.experiments.handover import Scene, run_handover
-from soro_lib.papers.soft_handover.world.observer import NO_NOISE, NoisyObserver
+from soro_lib.papers.soft_handover.experiments.handover import HEADINGS, still_handover, thesis_parameters
 from soro_lib.papers.soft_handover.world.plant import AngleLossPlant
 from soro_lib.project import data_directory
 from soro_lib.replication.datacards import generator_options
@@ -23,9 +20,6 @@ from soro_lib.replication.published import load_published
 
 FITTED_ROWS = ("s52_measured_distance", "s52_commanded_distance", "s52_gap")
 """The rows of ``published.csv`` that plant K is fitted to: final distances at step size 0.1."""
-
-STILL = Scene(placement_deviation=0.0, sway=0.0)
-"""The hand holds the ball exactly where it should, without noise: the fit depends on no random number."""
 
 EVENNESS = 0.02
 """Pull of the three shares towards each other in the fit; three numbers that depend on two things need it."""
@@ -49,23 +43,17 @@ def timestep(step_size: float) -> float:
     return float(np.interp(step_size, [0.1, 0.2, 0.4], seconds))
 
 
-def final_distances(realised: NDArray[np.float64], step_limit: int = 120) -> NDArray[np.float64]:
+def final_distances(realised: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return measured and commanded distance of the gripper and their gap (3,) [m] at the end of a still
     handover.
 
-    Mean over the four locations, step size 0.1, without noise.
+    Mean over the four locations, step size 0.1; without noise, so that the fit depends on no random number.
     """
-    controller = HandoverController(HandoverParameters(control=VirtualStiffnessController(step_size=0.1)))
     plant = AngleLossPlant(tuple(realised))
-    calibrated = controller.arm.tip_points(controller.arm.home)[3:]
-    rng = np.random.default_rng(0)
     ends = []
-    for location in STILL.headings:
-        ball = STILL.ball(location, calibrated, rng)
-        run = run_handover(
-            controller, plant, NoisyObserver(NO_NOISE), ball, rng, scene=STILL, step_limit=step_limit
-        )
-        ends.append([run.trace[name][-1] for name in ("measured_mm", "commanded_mm", "commanded_gap_mm")])
+    for location in HEADINGS:
+        trace = still_handover(thesis_parameters(0.1), plant, location, 120).trace
+        ends.append([trace[name][-1] for name in ("measured_mm", "commanded_mm", "commanded_gap_mm")])
     return 1e-3 * np.mean(ends, axis=0)
 
 

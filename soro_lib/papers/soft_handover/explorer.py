@@ -13,28 +13,27 @@ import ipywidgets
 import numpy as np
 import traitlets
 from IPython.display import Image as Picture
-from numpy.typing import NDArray
 
 from soro_lib.arcs import backbone
-from soro_lib.controllers.handover import UP, HandoverCommand, HandoverController, Mode
+from soro_lib.controllers.handover import HandoverCommand, HandoverController, Mode, goal_over
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
 from soro_lib.papers.soft_handover.calibration import plant_k
+from soro_lib.papers.soft_handover.experiments.handover import CALIBRATED_GRIPPER
 from soro_lib.papers.soft_handover.figures.vision import annotated, explorer_view
 from soro_lib.papers.soft_handover.world.observer import RenderedObserver, calibrate_on_box
-from soro_lib.papers.soft_handover.world.plant import ElasticPlant, Gripper, Hand, HelixPlant
+from soro_lib.papers.soft_handover.world.plant import Array, ElasticPlant, Gripper, HelixPlant, HoldingHand
 from soro_lib.papers.soft_handover.world.scene import STEREO
 from soro_lib.replication import as_image
 from soro_lib.replication.frontend import is_live
 from soro_lib.replication.plotting import COLORS
 from soro_lib.replication.view import ArmView, arm_scene, tube
-from soro_lib.robots.helix import HelixArm
 from soro_lib.sensing.camera import Image
 from soro_lib.sensing.handover_vision import ESTIMATORS, HandoverVision
 
 PACE = 0.25
 """Time between steps while the arm runs [s]; the thesis needs 1.4 s on its own computer."""
 
-BALL = HelixArm().tip_points(HelixArm().home)[3:] + np.array([-0.14, -0.03, 0.0]) + 0.06 * UP
+BALL = CALIBRATED_GRIPPER + np.array([-0.14, -0.03, -0.06])
 """Where the ball is at first [m]."""
 
 LOW, HIGH = np.array([-0.35, -0.35, 0.0]), np.array([0.35, 0.35, 0.9])
@@ -78,9 +77,9 @@ class HandoverSession:
         self.controller = HandoverController()
         self.set_step_size(step_size)
         self.observer = RenderedObserver(HandoverVision(self.cameras, estimator), spoil=self._cover)
-        self.push: NDArray[np.float64] | None = None
+        self.push: Array | None = None
         self.command: HandoverCommand | None = None
-        self.estimate: NDArray[np.float64] | None = None
+        self.estimate: Array | None = None
         self.steps = 0
         self.state = self.plant.settle(self.controller.parameters.motors.pull(np.zeros(9)))
         self.look()
@@ -102,7 +101,7 @@ class HandoverSession:
             return False
         hand = None
         if self.push is not None:
-            hand = Hand(np.concatenate([self.push + self.controller.arm.gripper_length * UP, self.push]))
+            hand = HoldingHand(goal_over(self.push, 0.0, self.controller.arm.gripper_length))
         pulled = self.controller.parameters.motors.pull(self.command.tendon_change)
         self.state = self.plant.settle(pulled, hand)
         self.steps += 1
@@ -115,7 +114,7 @@ class HandoverSession:
         return self.command is not None and self.command.mode in (Mode.GRASP, Mode.STOPPED)
 
     @property
-    def gripper(self) -> NDArray[np.float64]:
+    def gripper(self) -> Array:
         """Return the true gripper point (3,) [m]."""
         return self.controller.arm.tip_points(self.state)[3:]
 
@@ -132,16 +131,14 @@ class HandoverSession:
         error = "" if np.isnan(self.command.error) else f", error {1e3 * self.command.error:.0f} mm"
         return f"step {self.steps}, {self.command.mode}{error}" + (f": {trouble}" if trouble else "")
 
-    def dragged(
-        self, index: int, pixel: NDArray[np.float64], point: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def dragged(self, index: int, pixel: Array, point: Array) -> Array:
         """Return a point (3,) [m] moved to a pixel (2,) of a camera, at the same distance from its plane."""
         pose = self.observer.views[index].pose
         depth = float(pose[:3, 2] @ (point - pose[:3, 3]))
         ray = pose[:3, :3] @ self.observer.views[index].camera.rays([pixel])[0]
         return np.clip(pose[:3, 3] + depth * ray, LOW, HIGH)
 
-    def shapes(self) -> dict[str, NDArray[np.float64]]:
+    def shapes(self) -> dict[str, Array]:
         """Return the true, commanded and estimated backbones with the gripper (n, 3) [m]."""
         states = {"true": self.state, "commanded": self.controller.q_sys}
         if self.estimate is not None:
@@ -181,6 +178,10 @@ SHAPE_LOOKS = {
 }
 """Radius [m] and colour of the arm's shapes in the drawing."""
 
+SIDES = ("left", "right")
+
+CAPTION = "grey: true arm, purple: commanded, blue: estimated; drag to turn"
+
 GRAB = 90.0
 """How near to ball or gripper a drag must begin [px]."""
 
@@ -211,8 +212,7 @@ class HandoverExplorer(ipywidgets.VBox):
             buttons.style.button_width = "70px"
         self.step_size = ipywidgets.FloatSlider(description="alpha", min=0.05, max=1.0, step=0.05, value=0.2)
         self.covers = [
-            ipywidgets.Checkbox(description=f"cover the {side} camera", indent=False)
-            for side in ("left", "right")
+            ipywidgets.Checkbox(description=f"cover the {side} camera", indent=False) for side in SIDES
         ]
         self.message = ipywidgets.HTML()
         self.view = ArmView(layout={"flex": "1 1 420px", "min_width": "320px"})
@@ -291,7 +291,7 @@ class HandoverExplorer(ipywidgets.VBox):
             if not self.run.value:
                 self.advance()
 
-    def _nearest(self, index: int, pixel: NDArray[np.float64]) -> str:
+    def _nearest(self, index: int, pixel: Array) -> str:
         """Return whether ball or gripper is near a pixel of a camera, or ""."""
         places = {"ball": self.session.ball, "gripper": self.session.gripper}
         seen = self.session.cameras[index].project(list(places.values()))
@@ -301,20 +301,13 @@ class HandoverExplorer(ipywidgets.VBox):
 
     def _draw(self) -> None:
         session = self.session
-        for camera, picture, side in zip(self.cameras, session.pictures(), ("left", "right")):
+        for camera, picture, side in zip(self.cameras, session.pictures(), SIDES):
             camera.label = f"{side} camera: {session.status()}"
             camera.picture = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
         tubes = [tube(points, *SHAPE_LOOKS[name]) for name, points in session.shapes().items()]
         tubes.append(tube([session.ball, session.ball + 1e-3], 0.020, COLORS["green"]))
-        self.view.scene = arm_scene(
-            tubes,
-            session.observer.scene.wrist(session.state),
-            LOW,
-            HIGH,
-            hangs=True,
-            grid=0.1,
-            caption="grey: true arm, purple: commanded, blue: estimated; drag to turn",
-        )
+        wrist = session.observer.scene.wrist(session.state)
+        self.view.scene = arm_scene(tubes, wrist, LOW, HIGH, hangs=True, grid=0.1, caption=CAPTION)
         self.message.value = session.status()
 
 

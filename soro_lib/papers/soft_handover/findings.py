@@ -3,8 +3,9 @@
 The same claims are tried on both plants; the scorecard takes plant K unless a row names plant E.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from soro_lib.controllers.handover import HandoverParameters
 from soro_lib.controllers.virtual_stiffness import state_limits
 from soro_lib.papers.soft_handover.experiments.handover import STEP_SIZES, block_times
+from soro_lib.papers.soft_handover.experiments.vision import HIDDEN, SCENE
+from soro_lib.papers.soft_handover.world.scene import STEREO
 from soro_lib.replication.findings import Finding
 
 Samples = NDArray[np.float64]
@@ -43,20 +46,26 @@ class HandoverTables:
     without_estimation: pd.DataFrame
     suggestions: pd.DataFrame
 
+    def on(self, plant: str) -> "HandoverTables":
+        """Return the rows of one plant."""
+        return HandoverTables(*(table[table["plant"] == plant] for table in vars(self).values()))
 
-def claims(tables: HandoverTables, plant: str) -> dict[str, Samples]:
-    """Return for every ordinal claim of the thesis, per block or run, whether it held on a plant (1 or 0)."""
-    runs = tables.runs[tables.runs["plant"] == plant]
-    traces = tables.traces[tables.traces["plant"] == plant]
-    guided = tables.guided[tables.guided["plant"] == plant]
-    bare = tables.without_estimation[tables.without_estimation["plant"] == plant]
-    suggested = tables.suggestions[tables.suggestions["plant"] == plant]
 
-    medians = runs.pivot_table(index="block", columns="alpha", values="steps", aggfunc="median")
-    guided_medians = guided.pivot_table(index="block", columns="alpha", values="steps", aggfunc="median")
-    overshoot = runs.pivot_table(index="block", columns="alpha", values="overshoot_mm", aggfunc="median")
-    steps = suggested.pivot_table(index="block", columns="controller", values="steps", aggfunc="mean")
-    miss = suggested.pivot_table(index="block", columns="controller", values="miss_mm", aggfunc="median")
+def by_block(
+    runs: pd.DataFrame, columns: str, values: str, statistic: Literal["mean", "median"] = "median"
+) -> pd.DataFrame:
+    """Return a statistic of the runs of each block."""
+    return runs.pivot_table(index="block", columns=columns, values=values, aggfunc=statistic)
+
+
+def claims(tables: HandoverTables) -> dict[str, Samples]:
+    """Return for every ordinal claim of the thesis, per block or run of one plant, whether it held (1 or
+    0)."""
+    runs, traces, bare = tables.runs, tables.traces, tables.without_estimation
+    medians, guided = by_block(runs, "alpha", "steps"), by_block(tables.guided, "alpha", "steps")
+    overshoot = by_block(runs, "alpha", "overshoot_mm")
+    steps = by_block(tables.suggestions, "controller", "steps", "mean")
+    miss = by_block(tables.suggestions, "controller", "miss_mm")
     small = traces[traces["alpha"] == STEP_SIZES[0]]
     keys = ["alpha", "block", "run"]
     thesis = steps["thesis, step 0.4"]
@@ -70,8 +79,8 @@ def claims(tables: HandoverTables, plant: str) -> dict[str, Samples]:
         "s42_similar_steps": each(traces, ["block"], ends_with_similar_gaps),
         "fig10_estimate_closer": each(traces, keys, estimate_is_closer),
         "s33_estimation_needed": as_samples(~bare.loc[~bare["estimated"], "success"].astype(bool)),
-        "s43_guided_faster_01": as_samples(guided_medians[0.1] < medians[0.1].reindex(guided_medians.index)),
-        "s43_guided_faster_02": as_samples(guided_medians[0.2] < medians[0.2].reindex(guided_medians.index)),
+        "s43_guided_faster_01": as_samples(guided[0.1] < medians[0.1].reindex(guided.index)),
+        "s43_guided_faster_02": as_samples(guided[0.2] < medians[0.2].reindex(guided.index)),
         "s54_overshoot_with_step": as_samples(np.all(np.diff(overshoot[list(STEP_SIZES)]) > 0, axis=1)),
         "s54_variable_step_faster": as_samples(steps["error-dependent step"] < thesis),
         "s54_measurement_noise_faster": as_samples(steps["measured noise in filters"] < thesis),
@@ -85,7 +94,7 @@ def claims(tables: HandoverTables, plant: str) -> dict[str, Samples]:
 def claims_on_both(tables: HandoverTables) -> pd.DataFrame:
     """Return the share of blocks or runs in which each claim held, per plant, and whether it holds on
     both."""
-    by_plant = {plant: claims(tables, plant) for plant in ("K", "E")}
+    by_plant = {plant: claims(tables.on(plant)) for plant in PLANT_SUFFIXES}
     shares = pd.DataFrame({f"plant {p}": {k: v.mean() for k, v in c.items()} for p, c in by_plant.items()})
     shares["holds on both"] = (shares >= 0.8).all(axis=1)
     return shares.rename_axis("claim").reset_index()
@@ -144,9 +153,7 @@ def estimate_is_closer(run: pd.DataFrame) -> bool:
     return bool((seen["estimated_gap_mm"] <= seen["commanded_gap_mm"] + 5.0).all())
 
 
-def findings(
-    tables: HandoverTables, timestep: Mapping[float, float], parameters: HandoverParameters | None = None
-) -> dict[str, Finding]:
+def findings(tables: HandoverTables, timestep: Mapping[float, float]) -> dict[str, Finding]:
     """Return the findings of all experiments without cameras, keyed by the id of the published row.
 
     Parameters
@@ -154,32 +161,34 @@ def findings(
     tables : HandoverTables
     timestep : mapping of float to float
         Duration of a step [s] by step size, the thesis's.
-    parameters : HandoverParameters, optional
-        The settings that the definitions are read from.
     """
-    result = {
-        **time_findings(tables, timestep),
-        **distance_findings(tables),
-        **success_findings(tables),
-        **definition_findings(parameters or HandoverParameters()),
-    }
-    on_k, on_e = claims(tables, "K"), claims(tables, "E")
-    for name, samples in on_k.items():
-        result[name] = Finding(
-            samples, f"plant E: {on_e[name].mean():.2f}. {CLAIM_REASONS.get(name, '')}".strip()
-        )
+    result = definition_findings()
+    for plant in PLANT_SUFFIXES:
+        result |= plant_findings(tables.on(plant), plant, timestep)
+    on_k, on_e = tables.on("K"), tables.on("E")
+    claims_k, claims_e = claims(on_k), claims(on_e)
+    for name, samples in claims_k.items():
+        reason = f"plant E: {claims_e[name].mean():.2f}. {CLAIM_REASONS.get(name, '')}"
+        result[name] = Finding(samples, reason.strip())
     result["fig09_start_offset"] = Finding(
-        on_e["fig09_start_offset"],
+        claims_e["fig09_start_offset"],
         "plant E hangs 9 mm too low; plant K knows no weight and starts where it should",
     )
     result["s51_tail_at_small_step_plant_e"] = Finding(
-        on_e["s51_tail_at_small_step"], "as Table 1's slowest run: the error floor, and wound-up tendons"
+        claims_e["s51_tail_at_small_step"], "as Table 1's slowest run: the error floor, and wound-up tendons"
     )
-    k_traces = tables.traces[(tables.traces["plant"] == "K") & tables.traces["estimate_residual_mm"].notna()]
-    at_bound = np.isclose(k_traces["estimate_residual_mm"], 5.0, atol=1e-3)
-    shares = pd.Series(at_bound).groupby(k_traces["block"].to_numpy()).mean()
+    median = block_times(on_k.runs, timestep).pivot(index="block", columns="alpha", values="median_s")
+    result["s51_ratio_01_02"] = Finding(
+        median[0.1] / median[0.2], "above 2 because of the error floor at 0.1"
+    )
+    result["s51_ratio_02_04"] = Finding(median[0.2] / median[0.4], "below 2 because of the wrist's filter")
+    result["s43_guided_success"] = Finding(4 * on_k.guided.groupby("block")["success"].mean())
+    result["s44_use_case_success"] = Finding(on_k.use_cases.groupby("block")["dropped"].sum())
+    residuals = on_k.traces.dropna(subset="estimate_residual_mm")
+    at_bound = np.isclose(residuals["estimate_residual_mm"], 5.0, atol=1e-3)
     result["s52_residual_at_bound"] = Finding(
-        shares, "the first looks can lie within the bound, where the commanded state itself is the optimum"
+        pd.Series(at_bound).groupby(residuals["block"].to_numpy()).mean(),
+        "the first looks can lie within the bound, where the commanded state itself is the optimum",
     )
     return result
 
@@ -213,27 +222,6 @@ PLANT_SUFFIXES = {"K": "", "E": "_plant_e"}
 """Ends of the ids of rows that stand for each plant."""
 
 
-def time_findings(tables: HandoverTables, timestep: Mapping[float, float]) -> dict[str, Finding]:
-    """Return Table 1: per block of eight runs the fastest, median, slowest, mean and standard deviation."""
-    times = block_times(tables.runs, timestep)
-    result = {}
-    for plant, suffix in PLANT_SUFFIXES.items():
-        for step_size in STEP_SIZES:
-            blocks = times[(times["plant"] == plant) & (times["alpha"] == step_size)]
-            for statistic in ("min", "median", "max", "mean", "sd"):
-                result[f"table1_{statistic}_{round(10 * step_size):02d}{suffix}"] = Finding(
-                    blocks[f"{statistic}_s"],
-                    f"{TIME_REASONS[plant]}; {FLOOR_REASON}" if step_size == 0.1 else TIME_REASONS[plant],
-                )
-    times = times[times["plant"] == "K"]
-    median = times.pivot(index="block", columns="alpha", values="median_s")
-    result["s51_ratio_01_02"] = Finding(
-        median[0.1] / median[0.2], "above 2 because of the error floor at 0.1"
-    )
-    result["s51_ratio_02_04"] = Finding(median[0.2] / median[0.4], "below 2 because of the wrist's filter")
-    return result
-
-
 DISTANCE_REASONS = {
     "K": "plant K was fitted without noise",
     "E": "runs to balls opposite a tendon wind the command up and raise the mean",
@@ -241,46 +229,32 @@ DISTANCE_REASONS = {
 """Why the distances come out as they do."""
 
 
-def distance_findings(tables: HandoverTables) -> dict[str, Finding]:
-    """Return the final distances of Section 5.2 on both plants, per block [cm]."""
+def plant_findings(tables: HandoverTables, plant: str, timestep: Mapping[float, float]) -> dict[str, Finding]:
+    """Return, per block of eight runs on one plant, the times of Table 1 [s], how many runs succeed, and the
+    final distances of Section 5.2 [cm]."""
+    suffix = PLANT_SUFFIXES[plant]
     result = {}
-    small = tables.traces[tables.traces["alpha"] == STEP_SIZES[0]]
-    for plant, suffix in PLANT_SUFFIXES.items():
-        last = (
-            small[small["plant"] == plant]
-            .groupby(["block", "run"])
-            .last()
-            .groupby("block")
-            .mean(numeric_only=True)
+    times = block_times(tables.runs, timestep)
+    for step_size in STEP_SIZES:
+        blocks = times[times["alpha"] == step_size]
+        row = f"{round(10 * step_size):02d}{suffix}"
+        reason = f"{TIME_REASONS[plant]}; {FLOOR_REASON}" if step_size == 0.1 else TIME_REASONS[plant]
+        for statistic in ("min", "median", "max", "mean", "sd"):
+            result[f"table1_{statistic}_{row}"] = Finding(blocks[f"{statistic}_s"], reason)
+        result[f"s4_success_{row}"] = Finding(
+            blocks["successes"], "depends on how wide the gripper opens: 40 mm are assumed"
         )
-        for name, column in (
-            ("measured_distance", "measured_mm"),
-            ("commanded_distance", "commanded_mm"),
-            ("gap", "commanded_gap_mm"),
-        ):
-            result[f"s52_{name}{suffix}"] = Finding(last[column] / 10, DISTANCE_REASONS[plant])
+    small = tables.traces[tables.traces["alpha"] == STEP_SIZES[0]]
+    last = small.groupby(["block", "run"]).last().groupby("block").mean(numeric_only=True) / 10
+    for row, column in (("measured_distance", "measured"), ("commanded_distance", "commanded")):
+        result[f"s52_{row}{suffix}"] = Finding(last[f"{column}_mm"], DISTANCE_REASONS[plant])
+    result[f"s52_gap{suffix}"] = Finding(last["commanded_gap_mm"], DISTANCE_REASONS[plant])
     return result
 
 
-def success_findings(tables: HandoverTables) -> dict[str, Finding]:
-    """Return how many of the thesis's runs succeed, per block."""
-    result = {}
-    for plant, suffix in PLANT_SUFFIXES.items():
-        runs = tables.runs[tables.runs["plant"] == plant]
-        for step_size in STEP_SIZES:
-            per_block = runs[runs["alpha"] == step_size].groupby("block")["success"].sum()
-            result[f"s4_success_{round(10 * step_size):02d}{suffix}"] = Finding(
-                per_block, "depends on how wide the gripper opens: 40 mm are assumed"
-            )
-    guided = tables.guided[tables.guided["plant"] == "K"].groupby("block")["success"].mean()
-    result["s43_guided_success"] = Finding(4 * guided)
-    dropped = tables.use_cases[tables.use_cases["plant"] == "K"].groupby("block")["dropped"].sum()
-    result["s44_use_case_success"] = Finding(dropped)
-    return result
-
-
-def definition_findings(parameters: HandoverParameters) -> dict[str, Finding]:
+def definition_findings() -> dict[str, Finding]:
     """Return the printed parameters as the code has them."""
+    parameters = HandoverParameters()
     control, filters, arm = parameters.control, parameters.filters, parameters.control.arm
     lower, upper = state_limits(arm)
     points = arm.tip_points(arm.home)
@@ -295,16 +269,65 @@ def definition_findings(parameters: HandoverParameters) -> dict[str, Finding]:
         "appa_eps_control": control.tolerance,
         "appa_eps_threshold": parameters.stop_threshold,
     }
-    for name in ("ball", "wrist", "direction"):
-        noise = getattr(filters, name)
-        values[f"appa_q_{name}"] = noise.process
-        values[f"appa_r_{name}"] = noise.measurement
-    for i in range(3):
-        values[f"s31_length_{i + 1}"] = arm.rest_lengths[i]
-        values[f"eq11_bend_{i + 1}"] = upper[2 * i]
-        values[f"eq11_shortest_{i + 1}"] = lower[2 * i + 1]
-        values[f"eq11_longest_{i + 1}"] = upper[2 * i + 1]
-        values[f"appa_weight_{i + 1}"] = parameters.pose_weights[3 * i]
-        values[f"appa_k_bend_{i + 1}"] = control.stiffness[3 * i]
-        values[f"appa_k_length_{i + 1}"] = control.stiffness[3 * i + 2]
+    for name, noise in vars(filters).items():
+        values |= {f"appa_q_{name}": noise.process, f"appa_r_{name}": noise.measurement}
+    segments: dict[str, Iterable[float]] = {
+        "s31_length": arm.rest_lengths,
+        "eq11_bend": upper[::2],
+        "eq11_shortest": lower[1::2],
+        "eq11_longest": upper[1::2],
+        "appa_weight": parameters.pose_weights[::3],
+        "appa_k_bend": control.stiffness[::3],
+        "appa_k_length": control.stiffness[2::3],
+    }
+    for name, three in segments.items():
+        values |= {f"{name}_{number}": value for number, value in enumerate(three, start=1)}
     return {name: Finding(value) for name, value in values.items()}
+
+
+BLOCK = 20
+"""Poses that share one vote on a claim."""
+
+
+def vision_findings(
+    accuracy_table: pd.DataFrame, hidden: pd.DataFrame, places: pd.DataFrame
+) -> dict[str, Finding]:
+    """Return the findings of the vision study, keyed by the id of the published row.
+
+    Parameters
+    ----------
+    accuracy_table : DataFrame
+        Of :func:`soro_lib.papers.soft_handover.experiments.vision.accuracy`.
+    hidden : DataFrame
+        Of :func:`soro_lib.papers.soft_handover.experiments.vision_limits.occlusion`.
+    places : DataFrame
+        Of :func:`soro_lib.papers.soft_handover.experiments.vision_limits.workspace_limits`.
+    """
+    left, right = (view.pose[:3, 3] for view in STEREO)
+    ball = accuracy_table[accuracy_table["estimator"] == "joint"].pivot(
+        index="pose", columns="condition", values="ball_mm"
+    )
+    typical = ball.groupby(ball.index // BLOCK).median()
+    largest = hidden[hidden["rule"] == "largest piece"]
+    errors = largest.assign(hidden=largest["visible"] < HIDDEN, block=largest["pose"] // BLOCK)
+    medians = by_block(errors, "hidden", "ball_mm").dropna()
+    worst = {bool(key): group.quantile(0.95) for key, group in errors.groupby("hidden")["ball_mm"]}
+    default = places[(places["field_of_view"] == "78 deg") & (places["limit"] != "")]
+    parallel = default[default["cameras"] != "aimed at the arm"]
+    return {
+        "s32_baseline": Finding(float(np.linalg.norm(left - right))),
+        "s324_marker_size": Finding(1e3 * SCENE.ring.marker),
+        "s54_third_camera_better": Finding(
+            (typical["three cameras"] < typical["all causes"]).astype(float),
+            f"median {ball['all causes'].median():.2f} mm with two cameras, "
+            f"{ball['three cameras'].median():.2f} mm with a third from the side, in blocks of {BLOCK} poses",
+        ),
+        "fig15_occlusion_hurts": Finding(
+            (medians[True] > medians[False]).astype(float),
+            f"95th percentile {worst[True]:.1f} mm hidden, {worst[False]:.1f} mm not hidden",
+        ),
+        "fig14_side_limits": Finding(
+            (parallel["limit"] == "right").astype(float),
+            "for parallel and half toed-in cameras; cameras aimed at the arm reverse it",
+        ),
+    }

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soro_lib.controllers.handover import goal_over
-from soro_lib.papers.soft_handover.world.plant import Hand
+from soro_lib.papers.soft_handover.world.plant import Array, HoldingHand
 
 
 @dataclass
@@ -36,7 +35,7 @@ class GuidingHand:
     stiffness: float = 200.0
     gripper_length: float = 0.10
 
-    def __call__(self, step: int, gripper: NDArray[np.float64], ball: NDArray[np.float64]) -> Hand | None:
+    def __call__(self, step: int, gripper: Array, ball: Array) -> HoldingHand | None:
         """Return the pull of the hand, given step, true gripper (3,) and ball (3,) [m]."""
         if step < self.first_step:
             self._over = True
@@ -47,4 +46,4 @@ class GuidingHand:
         if self._over and distance < self.near:
             self._over = False
         lead = gripper + way * min(1.0, self.speed / max(distance, 1e-9))
-        return Hand(goal_over(lead, 0.0, self.gripper_length), self.stiffness)
+        return HoldingHand(goal_over(lead, 0.0, self.gripper_length), self.stiffness)

@@ -4,37 +4,31 @@ Every block of eight runs has its own calibration of the cameras. The controller
 :mod:`soro_lib.papers.soft_handover.experiments.handover`; only the eyes differ.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 
-from soro_lib.controllers.handover import HandoverParameters
 from soro_lib.papers.soft_handover.beyond import best_controller
-from soro_lib.papers.soft_handover.experiments.handover import handovers, thesis_parameters
-from soro_lib.papers.soft_handover.experiments.vision import Report, nothing
+from soro_lib.papers.soft_handover.experiments.handover import Blocks, Settings, compare, thesis_parameters
 from soro_lib.papers.soft_handover.world.observer import RenderedObserver, calibrate_on_box
 from soro_lib.papers.soft_handover.world.plant import HelixPlant
 from soro_lib.papers.soft_handover.world.scene import STEREO
 from soro_lib.sensing.handover_vision import HandoverVision
 
-STEP_SIZES = (0.1, 0.2, 0.3, 0.4)
+BEST: Settings = [({"controller": "best", "alpha": 1.0}, best_controller())]
+"""The best controller found."""
 
-
-def controllers() -> dict[str, HandoverParameters]:
-    """Return the thesis's controller at every step size, and the best one found."""
-    settings = {f"thesis, step {alpha}": thesis_parameters(alpha) for alpha in STEP_SIZES}
-    return {**settings, "best": best_controller()}
+CONTROLLERS: Settings = [
+    *(
+        ({"controller": f"thesis, step {alpha}", "alpha": alpha}, thesis_parameters(alpha))
+        for alpha in (0.1, 0.2, 0.3, 0.4)
+    ),
+    *BEST,
+]
+"""The thesis's controller at every step size, and the best one found."""
 
 
 def rendered_block(
-    plant_name: str,
-    plant: HelixPlant,
-    estimator: str,
-    block: int,
-    seed: int,
-    report: Report = nothing,
-    settings: Mapping[str, HandoverParameters] | None = None,
+    plant_name: str, plant: HelixPlant, estimator: str, block: int, seed: int, settings: Settings
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Return runs and traces of one block: eight runs of every controller, seen through one calibration.
 
@@ -47,9 +41,8 @@ def rendered_block(
     block : int
         Number of the block: another calibration, other places of the ball, the same for all controllers.
     seed : int
-    report : callable
-    settings : mapping of str to HandoverParameters, optional
-        Controllers by name; :func:`controllers` by default.
+    settings : sequence
+        The controllers.
 
     Returns
     -------
@@ -60,23 +53,10 @@ def rendered_block(
     selection, places = np.random.SeedSequence((seed, block)).spawn(2)
     cameras = calibrate_on_box(STEREO, np.random.default_rng(selection))
     observer = RenderedObserver(HandoverVision(cameras, estimator))
-    runs, traces = [], []
-    for name, parameters in (settings or controllers()).items():
-        run, trace = handovers(
-            parameters,
-            plant,
-            observer,
-            1,
-            int(places.generate_state(1)[0]),
-            plant=plant_name,
-            estimator=estimator,
-            controller=name,
-            alpha=parameters.control.step_size,
-        )
-        report(len(trace))
-        runs.append(run.assign(block=block))
-        traces.append(trace.assign(block=block))
-    return pd.concat(runs, ignore_index=True), pd.concat(traces, ignore_index=True)
+    place_seed = int(places.generate_state(1)[0])
+    tables = compare(settings, {plant_name: plant}, Blocks(observer, 1, place_seed), estimator=estimator)
+    runs, traces = (table.assign(block=block) for table in tables)
+    return runs, traces
 
 
 def run_summary(runs: pd.DataFrame) -> pd.DataFrame:

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.random import Generator
 
-from soro_lib.controllers.handover import UP, HandoverController, HandoverParameters, Mode
-from soro_lib.papers.soft_handover.experiments.handover import HandoverRun, Scene, run_handover
+from soro_lib.controllers.handover import HandoverController, HandoverParameters, Mode
+from soro_lib.papers.soft_handover.experiments import handover
 from soro_lib.papers.soft_handover.world.observer import Observer
-from soro_lib.papers.soft_handover.world.plant import HelixPlant
+from soro_lib.papers.soft_handover.world.plant import Array, HelixPlant
 
 
 @dataclass(frozen=True)
@@ -35,15 +35,18 @@ class Bowl:
     ball_radius: float = 0.02
     ball_mass: float = 0.03
 
-    def release_point(self, gripper: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the gripper point (3,) [m] over the bowl, given the calibrated one."""
-        heading = np.deg2rad(self.heading)
-        return gripper + self.lateral * np.array([np.cos(heading), np.sin(heading), 0.0]) + self.height * UP
+    @property
+    def release_point(self) -> Array:
+        """Gripper point (3,) [m] over the bowl."""
+        return handover.beside_the_gripper(self.heading, self.lateral, self.height)
 
-    def catches(self, ball: NDArray[np.float64], gripper: NDArray[np.float64]) -> bool:
-        """Return whether a ball (3,) let go falls in, given the calibrated gripper point."""
-        aside = (ball - self.release_point(gripper))[:2]
-        return bool(np.linalg.norm(aside) <= self.radius - self.ball_radius)
+    def off_centre(self, ball: Array) -> float:
+        """Return the horizontal distance of a ball (3,) from the middle of the bowl [m]."""
+        return float(np.linalg.norm((ball - self.release_point)[:2]))
+
+    def catches(self, ball: Array) -> bool:
+        """Return whether a ball (3,) let go falls in."""
+        return self.off_centre(ball) <= self.radius - self.ball_radius
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,8 @@ class Carry:
     dropped: bool
     steps: int
     miss: float
-    states: NDArray[np.float64]
-    commands: NDArray[np.float64]
+    states: Array
+    commands: Array
 
 
 def carry_and_drop(
@@ -73,16 +76,15 @@ def carry_and_drop(
     plant: HelixPlant,
     observer: Observer,
     bowl: Bowl,
-    handover: HandoverRun,
-    rng: np.random.Generator,
+    taken: handover.HandoverRun,
+    rng: Generator,
     step_limit: int = 300,
 ) -> Carry:
     """Carry a ball that was taken to the bowl and let it go there."""
     arm = controller.arm
     motors = controller.parameters.motors
-    calibrated = arm.tip_points(arm.home)[3:]
-    in_gripper = handover.ball - arm.tip_points(handover.state)[3:]
-    controller.carry_to(bowl.release_point(calibrated))
+    in_gripper = taken.ball - arm.tip_points(taken.state)[3:]
+    controller.carry_to(bowl.release_point)
     plant.carry(bowl.ball_mass)
     state = plant.settle(motors.pull(arm.tendon_lengths(controller.q_sys) - arm.tendon_lengths(arm.home)))
     states, commands = [state], [controller.q_sys]
@@ -94,22 +96,12 @@ def carry_and_drop(
         state = plant.settle(motors.pull(command.tendon_change))
         states.append(state)
         commands.append(command.q_sys)
-    miss = float(np.linalg.norm((ball - bowl.release_point(calibrated))[:2]))
-    dropped = command.mode is Mode.RELEASE and bowl.catches(ball, calibrated)
-    return Carry(dropped, len(states) - 1, miss, np.array(states), np.array(commands))
+    dropped = command.mode is Mode.RELEASE and bowl.catches(ball)
+    return Carry(dropped, len(states) - 1, bowl.off_centre(ball), np.array(states), np.array(commands))
 
 
 def use_cases(
-    parameters: HandoverParameters,
-    plant: HelixPlant,
-    observer: Observer,
-    repetitions: int,
-    seed: int,
-    /,
-    *,
-    scene: Scene | None = None,
-    bowl: Bowl | None = None,
-    **labels: object,
+    parameters: HandoverParameters, plant: HelixPlant, blocks: handover.Blocks, /, **labels: object
 ) -> pd.DataFrame:
     """Repeat the thesis's eight runs of the use case.
 
@@ -119,30 +111,14 @@ def use_cases(
         One row per run: labels, block, run, location, taken, dropped, handover_steps, carry_steps,
         bowl_miss_mm.
     """
-    scene, bowl = scene or Scene(), bowl or Bowl()
     controller = HandoverController(parameters)
-    calibrated = controller.arm.tip_points(controller.arm.home)[3:]
-    places = [location for location in scene.headings for _ in range(2)]
     rows = []
-    for number, sequence in enumerate(np.random.SeedSequence(seed).spawn(repetitions * len(places))):
-        rng = np.random.default_rng(sequence)
-        block, run = divmod(number, len(places))
-        ball = scene.ball(places[run], calibrated, rng)
-        handover = run_handover(controller, plant, observer, ball, rng, scene=scene)
-        carry = None
-        if handover.success:
-            carry = carry_and_drop(controller, plant, observer, bowl, handover, rng)
-        rows.append(
-            {
-                **labels,
-                "block": block,
-                "run": run,
-                "location": places[run],
-                "taken": handover.success,
-                "dropped": carry is not None and carry.dropped,
-                "handover_steps": handover.steps,
-                "carry_steps": carry.steps if carry else 0,
-                "bowl_miss_mm": 1e3 * carry.miss if carry else np.nan,
-            }
-        )
+    for trial, ball, rng in blocks.draw():
+        run = handover.run_handover(controller, plant, blocks.observer, ball, rng)
+        row = {**labels, **trial, "taken": run.success, "dropped": False}
+        row |= {"handover_steps": run.steps, "carry_steps": 0, "bowl_miss_mm": np.nan}
+        if run.success:
+            carry = carry_and_drop(controller, plant, blocks.observer, Bowl(), run, rng)
+            row |= {"dropped": carry.dropped, "carry_steps": carry.steps, "bowl_miss_mm": 1e3 * carry.miss}
+        rows.append(row)
     return pd.DataFrame(rows)

@@ -10,48 +10,73 @@ itself. 2. Early exit or all iterations, norms or squared norms: what each readi
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from soro_lib.controllers.handover import HandoverController, HandoverParameters, Mode, SafetyRules
+from soro_lib.controllers.handover import HandoverParameters, Mode, SafetyRules
 from soro_lib.controllers.virtual_stiffness import state_limits
 from soro_lib.estimators.handover_filters import APPENDIX_A, FilterNoise, FilterParameters
 from soro_lib.estimators.shape_estimation import estimate_shape
-from soro_lib.papers.soft_handover.experiments.handover import (
-    Scene,
-    handovers,
-    run_handover,
-    thesis_parameters,
-)
-from soro_lib.papers.soft_handover.world.observer import NO_NOISE, NoisyObserver, Observer
+from soro_lib.papers.soft_handover.experiments import handover
+from soro_lib.papers.soft_handover.experiments.handover import Settings, thesis_parameters
 from soro_lib.papers.soft_handover.world.plant import HelixPlant
-
-UNWATCHED = SafetyRules(frozen_looks=10**9, patience=10**9)
-"""Safety rules that let a loop stall for as long as it wants."""
-
-STILL = Scene(placement_deviation=0.0, sway=0.0)
-"""A hand that holds the ball exactly and still."""
 
 NO_FILTER = FilterParameters(*[FilterNoise(1.0, 1e-12)] * 3)
 """Filters that take every measurement as it is."""
 
 
+UNSTOPPED: dict[str, Any] = {
+    "stop_threshold": 1e-9,
+    "filters": NO_FILTER,
+    "safety": SafetyRules(frozen_looks=10**9, patience=10**9),
+}
+"""Settings that let a loop stall for as long as it wants."""
+
+
 def loop_variants(step_size: float) -> dict[str, HandoverParameters]:
-    """Return the readings of Algorithms 1 and 3 and Eq. (16) that the thesis leaves open, by name."""
+    """Return the readings of Algorithms 1 and 3 and Eq. (16) that the thesis leaves open, by name (Finding
+    2)."""
     printed = thesis_parameters(step_size)
+    squared = thesis_parameters(step_size, tolerance=0.005**0.5, inner_loop="early exit")
     return {
         "all 20 iterations": printed,
         "early exit": thesis_parameters(step_size, inner_loop="early exit"),
-        "squared norm in Algorithm 1": thesis_parameters(
-            step_size, tolerance=0.005**0.5, inner_loop="early exit"
-        ),
+        "squared norm in Algorithm 1": squared,
         "squared norm in Eq. (16)": replace(printed, pose_bound=0.005**0.5),
         "squared norm in Algorithm 3": replace(printed, stop_threshold=0.05**0.5),
         "pose bound 2 mm": replace(printed, pose_bound=0.002),
         "no filter": replace(printed, filters=NO_FILTER),
         "no error floor": thesis_parameters(step_size, error_reference="measurement"),
     }
+
+
+def readings(step_sizes: Sequence[float]) -> Settings:
+    """Return the settings of all :func:`loop_variants`, by step size and reading."""
+    return [
+        ({"alpha": step_size, "variant": name}, parameters)
+        for step_size in step_sizes
+        for name, parameters in loop_variants(step_size).items()
+    ]
+
+
+def with_and_without_filters(step_sizes: Sequence[float]) -> Settings:
+    """Return the settings that show what the thesis's filters cost (Finding 3)."""
+    return [
+        ({"alpha": step_size, "filters": name}, replace(thesis_parameters(step_size), filters=filters))
+        for step_size in step_sizes
+        for name, filters in (("Appendix A", APPENDIX_A), ("no filter", NO_FILTER))
+    ]
+
+
+def with_and_without_estimation(step_size: float) -> Settings:
+    """Return the settings that show what the state optimisation is good for (Finding 5)."""
+    return [
+        ({"alpha": step_size, "estimated": on}, replace(thesis_parameters(step_size), estimate_shape=on))
+        for on in (True, False)
+    ]
 
 
 def error_floor(
@@ -70,60 +95,14 @@ def error_floor(
         loop, alpha, pose_bound_mm, floor_mm (simulated), predicted_mm (bound over alpha).
     """
     rows = []
-    for loop in ("all 20 iterations", "early exit", "no error floor"):
-        for step_size in step_sizes:
-            for bound in pose_bounds:
-                parameters = replace(
-                    loop_variants(step_size)[loop],
-                    pose_bound=bound,
-                    stop_threshold=1e-9,
-                    filters=NO_FILTER,
-                    safety=UNWATCHED,
-                )
-                controller = HandoverController(parameters)
-                calibrated = controller.arm.tip_points(controller.arm.home)[3:]
-                rng = np.random.default_rng(0)
-                ball = STILL.ball("front", calibrated, rng)
-                observer = NoisyObserver(NO_NOISE)
-                run = run_handover(controller, plant, observer, ball, rng, scene=STILL, step_limit=steps)
-                rows.append(
-                    {
-                        "loop": loop,
-                        "alpha": step_size,
-                        "pose_bound_mm": 1e3 * bound,
-                        "floor_mm": run.trace["error_mm"][-20:].mean(),
-                        "predicted_mm": 1e3 * bound / step_size,
-                    }
-                )
-    return pd.DataFrame(rows)
-
-
-def compare_variants(
-    plants: Mapping[str, HelixPlant],
-    observer: Observer,
-    step_sizes: Sequence[float],
-    repetitions: int,
-    seed: int,
-    step_limit: int = 300,
-) -> pd.DataFrame:
-    """Return all runs of all readings of the algorithm (Finding 2), one row per run."""
-    tables = [
-        handovers(
-            parameters,
-            plant,
-            observer,
-            repetitions,
-            seed,
-            step_limit=step_limit,
-            plant=name,
-            alpha=step_size,
-            variant=variant,
-        )[0]
-        for name, plant in plants.items()
-        for step_size in step_sizes
-        for variant, parameters in loop_variants(step_size).items()
-    ]
-    return pd.concat(tables, ignore_index=True)
+    for loop, step_size, bound in product(
+        ("all 20 iterations", "early exit", "no error floor"), step_sizes, pose_bounds
+    ):
+        parameters = replace(loop_variants(step_size)[loop], pose_bound=bound, **UNSTOPPED)
+        run = handover.still_handover(parameters, plant, "front", steps)
+        floor = run.trace["error_mm"][-20:].mean()
+        rows.append((loop, step_size, 1e3 * bound, floor, 1e3 * bound / step_size))
+    return pd.DataFrame(rows, columns=["loop", "alpha", "pose_bound_mm", "floor_mm", "predicted_mm"])
 
 
 def filter_pole(step_gain: float, filter_gain: float) -> float:
@@ -142,21 +121,6 @@ def steady_gain(noise: FilterNoise) -> float:
     ratio = noise.process / noise.measurement
     predicted = (ratio + np.sqrt(ratio**2 + 4 * ratio)) / 2
     return float(predicted / (predicted + 1))
-
-
-def filter_cap(
-    plant: HelixPlant, observer: Observer, step_sizes: Sequence[float], repetitions: int, seed: int
-) -> pd.DataFrame:
-    """Return all runs over step sizes with the thesis's filters and without (Finding 3), one row per run."""
-    tables = []
-    for step_size in step_sizes:
-        for label, filters in (("Appendix A", APPENDIX_A), ("no filter", NO_FILTER)):
-            parameters = replace(thesis_parameters(step_size), filters=filters)
-            runs, _ = handovers(
-                parameters, plant, observer, repetitions, seed, alpha=step_size, filters=label
-            )
-            tables.append(runs)
-    return pd.concat(tables, ignore_index=True)
 
 
 def estimated_shapes(
@@ -181,13 +145,12 @@ def estimated_shapes(
     arm = parameters.control.arm
     lower, upper = (limit[1::2] for limit in state_limits(arm))
     bends = np.asarray(arm.maximum_bends)
-    rows = []
+    tables = []
     for case in range(cases):
         heading, share = rng.uniform(0, 2 * np.pi, 3), np.sqrt(rng.uniform(0, 1, 3))
         lengths = rng.uniform(lower, upper)
-        command = np.stack(
-            [share * bends * np.cos(heading), share * bends * np.sin(heading), lengths], axis=-1
-        ).ravel()
+        bending = share * bends * np.cos(heading), share * bends * np.sin(heading)
+        command = np.stack([*bending, lengths], axis=-1).ravel()
         for name, plant in plants.items():
             plant.reset()
             true = plant.settle(arm.tendon_lengths(command))
@@ -195,58 +158,19 @@ def estimated_shapes(
                 weights = np.asarray(parameters.pose_weights) * np.tile([1, 1, weight], 3)
                 estimate = estimate_shape(command, arm.tip_points(true), parameters.pose_bound, weights)
                 miss = (estimate.q - true).reshape(3, 3)
-                estimated_lengths = estimate.q[2::3]
-                for segment in range(3):
-                    rows.append(
-                        {
-                            "plant": name,
-                            "length_weight": weight,
-                            "case": case,
-                            "segment": segment + 1,
-                            "bend_error_deg": np.rad2deg(np.hypot(*miss[segment, :2])),
-                            "length_error_mm": 1e3 * miss[segment, 2],
-                            "outside": not lower[segment] <= estimated_lengths[segment] <= upper[segment],
-                        }
-                    )
-    return pd.DataFrame(rows)
-
-
-def without_estimation(
-    plants: Mapping[str, HelixPlant],
-    observer: Observer,
-    step_sizes: Sequence[float],
-    repetitions: int,
-    seed: int,
-    step_limit: int = 150,
-) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return runs and traces with and without the state optimisation (Finding 5)."""
-    runs, traces = [], []
-    for name, plant in plants.items():
-        for step_size in step_sizes:
-            for estimated in (True, False):
-                parameters = replace(thesis_parameters(step_size), estimate_shape=estimated)
-                run, trace = handovers(
-                    parameters,
-                    plant,
-                    observer,
-                    repetitions,
-                    seed,
-                    step_limit=step_limit,
-                    plant=name,
-                    alpha=step_size,
-                    estimated=estimated,
-                )
-                runs.append(run)
-                traces.append(trace)
-    return pd.concat(runs, ignore_index=True), pd.concat(traces, ignore_index=True)
+                estimated = estimate.q[2::3]
+                errors = {
+                    "bend_error_deg": np.rad2deg(np.hypot(*miss[:, :2].T)),
+                    "length_error_mm": 1e3 * miss[:, 2],
+                    "outside": (estimated < lower) | (estimated > upper),
+                }
+                labels = {"plant": name, "length_weight": weight, "case": case, "segment": (1, 2, 3)}
+                tables.append(pd.DataFrame({**labels, **errors}))
+    return pd.concat(tables, ignore_index=True)
 
 
 def reach_by_heading(
-    plants: Mapping[str, HelixPlant],
-    headings: Sequence[float] = (0.0, 180.0),
-    laterals: Sequence[float] = (0.11, 0.13, 0.14, 0.15, 0.16, 0.17, 0.18, 0.20),
-    step_size: float = 0.4,
-    step_limit: int = 120,
+    plants: Mapping[str, HelixPlant], laterals: Sequence[float], step_limit: int = 120
 ) -> pd.DataFrame:
     """Return the steps to balls farther and farther aside, without noise (Finding 6).
 
@@ -256,29 +180,11 @@ def reach_by_heading(
     Returns
     -------
     DataFrame
-        plant, heading_deg, lateral_mm, steps, closed, bend_deg (largest commanded bend of a segment at the
-        end).
+        plant, heading_deg, lateral_mm, steps, closed.
     """
     rows = []
-    for name, plant in plants.items():
-        for heading in headings:
-            for lateral in laterals:
-                scene = Scene(lateral, headings={"ball": heading}, placement_deviation=0.0, sway=0.0)
-                controller = HandoverController(thesis_parameters(step_size))
-                arm, rng = controller.arm, np.random.default_rng(0)
-                ball = scene.ball("ball", arm.tip_points(arm.home)[3:], rng)
-                run = run_handover(
-                    controller, plant, NoisyObserver(NO_NOISE), ball, rng, scene=scene, step_limit=step_limit
-                )
-                bends = arm.bends_and_lengths(run.commands[-1])[::2]
-                rows.append(
-                    {
-                        "plant": name,
-                        "heading_deg": heading,
-                        "lateral_mm": 1e3 * lateral,
-                        "steps": run.steps,
-                        "closed": run.mode is Mode.GRASP,
-                        "bend_deg": np.rad2deg(bends.max()),
-                    }
-                )
-    return pd.DataFrame(rows)
+    for (name, plant), heading, lateral in product(plants.items(), (0.0, 180.0), laterals):
+        holder = handover.BallHolder(lateral, headings={"ball": heading}, placement_deviation=0.0, sway=0.0)
+        run = handover.still_handover(thesis_parameters(0.4), plant, "ball", step_limit, holder)
+        rows.append((name, heading, 1e3 * lateral, run.steps, run.mode is Mode.GRASP))
+    return pd.DataFrame(rows, columns=["plant", "heading_deg", "lateral_mm", "steps", "closed"])

@@ -4,37 +4,30 @@ Poses are drawn at random where handovers happen; images are rendered and detect
 tables are tidy, errors in mm and degrees in the frame `arm_base` (y is the cameras' depth).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from soro_lib.papers.soft_handover.world.observer import calibrate_on_box
-from soro_lib.papers.soft_handover.world.scene import (
-    SIDE_CAMERA,
-    STEREO,
-    WEBCAM,
-    HandoverScene,
-    Viewpoint,
-    photograph,
-)
+from soro_lib.papers.soft_handover.world.plant import Array
+from soro_lib.papers.soft_handover.world.scene import SIDE_CAMERA, STEREO, WEBCAM, HandoverScene, photographs
 from soro_lib.project import data_directory
 from soro_lib.replication.datacards import verified
-from soro_lib.replication.findings import Finding
-from soro_lib.robots.helix import HelixArm
 from soro_lib.sensing.handover_observation import HandoverObservation
 from soro_lib.sensing.handover_vision import ESTIMATORS, HandoverVision, Look
 from soro_lib.sensing.marker_pose import WristPose, average_pose, wrist_candidates
 from soro_lib.sensing.stereo_vision import CORNER_SHIFT, CalibratedCamera
 from soro_lib.worlds.rendering import Photometry
 
+SCENE = HandoverScene()
+"""The arm, the ring and the ball of all pictures."""
+
 SEED = 7
 """Seed of the recordings."""
-
-Report = Callable[[int], None]
-"""Told how many more pictures have been looked at."""
 
 HIDDEN = 0.85
 """Visible share below which a ball counts as partly hidden."""
@@ -50,14 +43,10 @@ def recorded(name: str) -> pd.DataFrame:
     return pd.read_csv(verified(data_directory("soft_handover") / f"{name}.csv.gz"))
 
 
-def nothing(pictures: int) -> None:
-    """Report to nobody."""
-
-
-def random_states(count: int, rng: np.random.Generator, arm: HelixArm | None = None) -> NDArray[np.float64]:
+def random_states(count: int, rng: Generator) -> Array:
     """Return true states (count, 9) that put the gripper where handovers happen."""
-    arm = arm or HelixArm()
-    kept: list[NDArray[np.float64]] = []
+    arm = SCENE.arm
+    kept: list[Array] = []
     while len(kept) < count:
         states = np.tile(arm.home.reshape(3, 3), (200, 1, 1))
         states[:, :, :2] += rng.normal(0.0, [[0.2], [0.4], [0.4]], (200, 3, 2))
@@ -71,9 +60,20 @@ def random_states(count: int, rng: np.random.Generator, arm: HelixArm | None = N
     return np.array(kept[:count])
 
 
-def ball_before(gripper: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+def ball_before(gripper: Array, rng: Generator) -> Array:
     """Return a ball (3,) [m] below and beside the gripper point, as during an approach."""
     return gripper + rng.uniform([-0.08, -0.08, 0.05], [0.08, 0.08, 0.12])
+
+
+def approach(rng: Generator) -> tuple[Array, Array]:
+    """Return a random true state (9,) and a ball (3,) [m] before its gripper."""
+    state = random_states(1, rng)[0]
+    return state, ball_before(SCENE.arm.tip_points(state)[3:], rng)
+
+
+def poses(count: int, seed: int) -> Iterator[tuple[int, Generator]]:
+    """Yield the number of each random pose and its random numbers, the same however many poses follow."""
+    return enumerate(map(np.random.default_rng, np.random.SeedSequence(seed).spawn(count)))
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Condition:
     Attributes
     ----------
     name : str
-    views : sequence of Viewpoint
+    views : sequence of CalibratedCamera
         The cameras.
     selection_deviation : float
         With which the corners of the calibration box are selected [px].
@@ -95,7 +95,7 @@ class Condition:
     """
 
     name: str
-    views: Sequence[Viewpoint] = STEREO
+    views: Sequence[CalibratedCamera] = STEREO
     selection_deviation: float = 0.5
     photometry: Photometry = WEBCAM
     corner_shift: float = CORNER_SHIFT
@@ -115,9 +115,7 @@ CAUSES = (
 """The conditions of the error budget."""
 
 
-def accuracy(
-    count: int, seed: int, conditions: Sequence[Condition] = CAUSES, report: Report = nothing
-) -> pd.DataFrame:
+def accuracy(count: int, seed: int, conditions: Sequence[Condition] = CAUSES) -> pd.DataFrame:
     """Return the errors of every estimator at random poses under every condition.
 
     All conditions see the same poses, and are calibrated with the same selection errors scaled.
@@ -128,7 +126,6 @@ def accuracy(
         Number of poses.
     seed : int
     conditions : sequence of Condition
-    report : callable
 
     Returns
     -------
@@ -137,100 +134,63 @@ def accuracy(
         one), wrist_{x,y,z}_mm, wrist_mm, direction_{x,y,z}, direction_deg, claimed_mm, gripper_mm,
         ball_{x,y,z}_mm, ball_mm, gap_mm.
     """
-    scene = HandoverScene()
     rows = []
-    for pose, sequence in enumerate(np.random.SeedSequence(seed).spawn(count)):
-        rng = np.random.default_rng(sequence)
-        state = random_states(1, rng)[0]
-        ball = ball_before(scene.arm.tip_points(state)[3:], rng)
-        picture_seed, selection_seed = sequence.spawn(2)
+    for pose, rng in poses(count, seed):
+        state, ball = approach(rng)
+        items = SCENE.items(state, ball)
+        picture_seed, selection_seed = rng.bit_generator.seed_seq.spawn(2)  # type: ignore[attr-defined]
         for condition in conditions:
-            cameras = calibrate_on_box(
-                condition.views, np.random.default_rng(selection_seed), condition.selection_deviation
-            )
-            pictures = np.random.default_rng(picture_seed)
-            for estimator, look, wrist, flipped in _estimates(
-                scene, state, ball, condition, cameras, pictures
-            ):
-                errors = _errors(scene, state, ball, look.observation, wrist)
-                seen = sum(map(len, look.markers))
-                rows.append(
-                    {
-                        "condition": condition.name,
-                        "estimator": estimator,
-                        "pose": pose,
-                        "markers": seen,
-                        "flipped": flipped,
-                        **errors,
-                    }
-                )
-        report(1)
+            selection = np.random.default_rng(selection_seed)
+            cameras = calibrate_on_box(condition.views, selection, condition.selection_deviation)
+            noise = np.random.default_rng(picture_seed)
+            pictures = photographs(items, condition.views, condition.photometry, noise)
+            # One look for all estimators, so that the ball is the same: nothing hides it here.
+            vision = HandoverVision(cameras, "joint", track=False, corner_shift=condition.corner_shift)
+            look = vision.look(pictures)
+            candidates, flips = true_candidates(look, cameras, state)
+            flipped = float(flips.mean()) if len(flips) else np.nan
+            seen = {"pose": pose, "markers": sum(map(len, look.markers)), "flipped": flipped}
+            for estimator in ("thesis",) if condition.flips_known else ESTIMATORS:
+                wrist = vision.estimate(look.markers, estimator)
+                if condition.flips_known and len(candidates):
+                    wrist = average_pose(candidates)
+                errors = look_errors(state, ball, look.observation, wrist)
+                rows.append({"condition": condition.name, "estimator": estimator, **seen, **errors})
     return pd.DataFrame(rows)
 
 
-def _estimates(
-    scene: HandoverScene,
-    state: NDArray[np.float64],
-    ball: NDArray[np.float64],
-    condition: Condition,
-    cameras: Sequence[CalibratedCamera],
-    rng: np.random.Generator,
-) -> Iterator[tuple[str, Look, WristPose | None, float]]:
-    """Yield for each estimator its name, the look, its wrist and the share of flipped markers.
-
-    All are made of one look, so the ball is the same: nothing hides it here.
-    """
-    items = scene.items(state, ball)
-    pictures = [photograph(items, view, condition.photometry, rng) for view in condition.views]
-    vision = HandoverVision(cameras, "joint", track=False, corner_shift=condition.corner_shift)
-    look = vision.look(pictures)
-    candidates, flips = true_candidates(look, cameras, scene, state)
-    flipped = float(flips.mean()) if len(flips) else np.nan
-    for estimator in ("thesis",) if condition.flips_known else ESTIMATORS:
-        if condition.flips_known and len(candidates):
-            wrist: WristPose | None = average_pose(candidates)
-        else:
-            wrist = vision.estimate(look.markers, estimator)
-        yield estimator, look, wrist, flipped
-
-
 def true_candidates(
-    look: Look, cameras: Sequence[CalibratedCamera], scene: HandoverScene, state: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    look: Look, cameras: Sequence[CalibratedCamera], state: Array
+) -> tuple[Array, NDArray[np.bool_]]:
     """Return the poses of all markers, the one nearer to the truth first (m, 2, 4, 4), and which of them
     OpenCV had second (m,)."""
-    sights = [wrist_candidates(m, c, scene.ring) for c, m in zip(cameras, look.markers) if m]
-    if not sights:
-        return np.empty((0, 2, 4, 4)), np.empty(0, dtype=bool)
-    candidates = np.concatenate(sights)
-    truth = scene.wrist(state)[:3, 2]
-    agreement = candidates[..., :3, 2] @ truth
+    sights = [wrist_candidates(m, c, SCENE.ring) for c, m in zip(cameras, look.markers) if m]
+    candidates = np.concatenate([np.empty((0, 2, 4, 4)), *sights])
+    agreement = candidates[..., :3, 2] @ SCENE.wrist(state)[:3, 2]
     flipped = agreement[:, 1] > agreement[:, 0]
     candidates[flipped] = candidates[flipped][:, ::-1]
     return candidates, flipped
 
 
-def _errors(
-    scene: HandoverScene,
-    state: NDArray[np.float64],
-    ball: NDArray[np.float64],
-    seen: HandoverObservation,
-    wrist: WristPose | None,
+def look_errors(
+    state: Array, ball: Array, seen: HandoverObservation, wrist: WristPose | HandoverObservation | None
 ) -> dict[str, float]:
-    """Return all errors of one look against the truth."""
+    """Return all errors of one look against the truth, NaN where nothing was seen."""
     missing = np.full(3, np.nan)
-    points = scene.arm.tip_points(state)
-    axis = (points[3:] - points[:3]) / scene.arm.gripper_length
-    wrist_error = missing if wrist is None else 1e3 * (wrist.wrist - points[:3])
-    pointing = missing if wrist is None else wrist.direction
-    gripper_error = wrist_error + 1e3 * scene.arm.gripper_length * (pointing - axis)
+    points = SCENE.arm.tip_points(state)
+    axis = (points[3:] - points[:3]) / SCENE.arm.gripper_length
+    wrist_error, turn, claimed = missing, missing, np.nan
+    if wrist is not None and wrist.wrist is not None and wrist.direction is not None:
+        wrist_error, turn = 1e3 * (wrist.wrist - points[:3]), wrist.direction - axis
+        claimed = 1e3 * wrist.wrist_deviation
+    gripper_error = wrist_error + 1e3 * SCENE.arm.gripper_length * turn
     ball_error = missing if seen.ball is None else 1e3 * (seen.ball - ball)
     return {
         **{f"wrist_{name}_mm": value for name, value in zip("xyz", wrist_error)},
         "wrist_mm": float(np.linalg.norm(wrist_error)),
-        **{f"direction_{name}": value for name, value in zip("xyz", pointing - axis)},
-        "direction_deg": float(np.rad2deg(2 * np.arcsin(np.linalg.norm(pointing - axis) / 2))),
-        "claimed_mm": np.nan if wrist is None else 1e3 * wrist.wrist_deviation,
+        **{f"direction_{name}": value for name, value in zip("xyz", turn)},
+        "direction_deg": float(np.rad2deg(2 * np.arcsin(np.linalg.norm(turn) / 2))),
+        "claimed_mm": claimed,
         "gripper_mm": float(np.linalg.norm(gripper_error)),
         **{f"ball_{name}_mm": value for name, value in zip("xyz", ball_error)},
         "ball_mm": float(np.linalg.norm(ball_error)),
@@ -251,22 +211,10 @@ def error_budget(table: pd.DataFrame) -> pd.DataFrame:
     return budget.reset_index()
 
 
-@dataclass(frozen=True)
-class NoiseSources:
-    """Repeated looks at still arms: what changes from look to look, and what stays.
-
-    Attributes
-    ----------
-    poses, looks : int
-        Still arms, and looks at each.
-    """
-
-    poses: int = 40
-    looks: int = 8
-
-
-def still_looks(sources: NoiseSources, seed: int, report: Report = nothing) -> pd.DataFrame:
+def still_looks(count: int, seed: int, looks: int = 8) -> pd.DataFrame:
     """Return the errors of repeated looks at still arms, each pose with its own calibration.
+
+    What changes from look to look is jitter, what stays is bias.
 
     Returns
     -------
@@ -274,26 +222,22 @@ def still_looks(sources: NoiseSources, seed: int, report: Report = nothing) -> p
         camera_system ("thesis", "gated", "joint", "three cameras"), pose, look, and the errors of
         :func:`accuracy`.
     """
-    scene = HandoverScene()
     views = (*STEREO, SIDE_CAMERA)
     rows = []
-    for pose, sequence in enumerate(np.random.SeedSequence(seed).spawn(sources.poses)):
-        rng = np.random.default_rng(sequence)
-        state = random_states(1, rng)[0]
-        ball = ball_before(scene.arm.tip_points(state)[3:], rng)
+    for pose, rng in poses(count, seed):
+        state, ball = approach(rng)
         cameras = calibrate_on_box(views, rng)
         systems = {name: HandoverVision(cameras[:2], name, track=False) for name in ESTIMATORS}
         systems["three cameras"] = HandoverVision(cameras, "joint", track=False)
-        items = scene.items(state, ball)
-        for number in range(sources.looks):
-            pictures = [photograph(items, view, WEBCAM, rng) for view in views]
+        items = SCENE.items(state, ball)
+        for number in range(looks):
+            pictures = photographs(items, views, WEBCAM, rng)
             for name, vision in systems.items():
                 vision.reset()
                 look = vision.look(pictures[: len(vision.cameras)])
                 wrist = vision.estimate(look.markers, vision.estimator)
-                errors = _errors(scene, state, ball, look.observation, wrist)
+                errors = look_errors(state, ball, look.observation, wrist)
                 rows.append({"camera_system": name, "pose": pose, "look": number, **errors})
-        report(1)
     return pd.DataFrame(rows)
 
 
@@ -310,68 +254,20 @@ def noise_figures(still: pd.DataFrame, hidden: pd.DataFrame) -> dict[str, dict[s
     hidden : DataFrame
         Of :func:`soro_lib.papers.soft_handover.experiments.vision_limits.occlusion`.
     """
+    columns = {
+        "wrist": ([f"wrist_{axis}_mm" for axis in "xyz"], 1e-3),
+        "direction": ([f"direction_{axis}" for axis in "xyz"], 1.0),
+        "ball": ([f"ball_{axis}_mm" for axis in "xyz"], 1e-3),
+    }
     figures: dict[str, dict[str, float]] = {}
     for name, looks in still.groupby("camera_system", sort=False):
-        figures[str(name)] = {}
-        for what, columns, unit in (
-            ("wrist", [f"wrist_{axis}_mm" for axis in "xyz"], 1e-3),
-            ("direction", [f"direction_{axis}" for axis in "xyz"], 1.0),
-            ("ball", [f"ball_{axis}_mm" for axis in "xyz"], 1e-3),
-        ):
-            groups = looks.groupby("pose")[columns]
-            jitter = float(np.sqrt(np.nanmean(groups.var())))
-            bias = float(np.sqrt(np.nanmean(groups.mean() ** 2)))
-            figures[str(name)] |= {f"{what}_jitter": unit * jitter, f"{what}_bias": unit * bias}
+        budget = figures[str(name)] = {}
+        for what, (errors, unit) in columns.items():
+            groups = looks.groupby("pose")[errors]
+            budget[f"{what}_jitter"] = unit * float(np.sqrt(np.nanmean(groups.var())))
+            budget[f"{what}_bias"] = unit * float(np.sqrt(np.nanmean(groups.mean() ** 2)))
         rule = "largest piece" if name == "thesis" else "joined pieces"
         covered = hidden[(hidden["rule"] == rule) & (hidden["visible"] < HIDDEN)]
-        errors = covered[[f"ball_{axis}_mm" for axis in "xyz"]].to_numpy()
-        figures[str(name)]["occluded_ball"] = 1e-3 * float(np.sqrt(np.nanmean(errors**2)))
+        balls = covered[columns["ball"][0]].to_numpy()
+        budget["occluded_ball"] = 1e-3 * float(np.sqrt(np.nanmean(balls**2)))
     return figures
-
-
-BLOCK = 20
-"""Poses that share one vote on a claim."""
-
-
-def vision_findings(
-    accuracy_table: pd.DataFrame, hidden: pd.DataFrame, places: pd.DataFrame
-) -> dict[str, Finding]:
-    """Return the findings of the vision study, keyed by the id of the published row.
-
-    Parameters
-    ----------
-    accuracy_table : DataFrame
-        Of :func:`accuracy`.
-    hidden : DataFrame
-        Of :func:`soro_lib.papers.soft_handover.experiments.vision_limits.occlusion`.
-    places : DataFrame
-        Of :func:`soro_lib.papers.soft_handover.experiments.vision_limits.workspace_limits`.
-    """
-    left, right = (view.pose[:3, 3] for view in STEREO)
-    ball = accuracy_table[accuracy_table["estimator"] == "joint"].pivot(
-        index="pose", columns="condition", values="ball_mm"
-    )
-    by_block = ball.groupby(ball.index // BLOCK).median()
-    largest = hidden[hidden["rule"] == "largest piece"]
-    errors = largest.assign(hidden=largest["visible"] < HIDDEN, block=largest["pose"] // BLOCK)
-    medians = errors.pivot_table(index="block", columns="hidden", values="ball_mm", aggfunc="median").dropna()
-    worst = {bool(key): group.quantile(0.95) for key, group in errors.groupby("hidden")["ball_mm"]}
-    default = places[(places["field_of_view"] == "78 deg") & (places["limit"] != "")]
-    parallel = default[default["cameras"] != "aimed at the arm"]
-    return {
-        "s32_baseline": Finding(float(np.linalg.norm(left - right))),
-        "s324_marker_size": Finding(1e3 * HandoverScene().ring.marker),
-        "s54_third_camera_better": Finding(
-            (by_block["three cameras"] < by_block["all causes"]).astype(float),
-            f"median {ball['all causes'].median():.2f} mm with two cameras, "
-            f"{ball['three cameras'].median():.2f} mm with a third from the side, in blocks of {BLOCK} poses",
-        ),
-        "fig15_occlusion_hurts": Finding(
-            (medians[True] > medians[False]).astype(float),
-            f"95th percentile {worst[True]:.1f} mm hidden, {worst[False]:.1f} mm not hidden",
-        ),
-        "fig14_side_limits": Finding(
-            (parallel["limit"] == "right").astype(float),
-            "for parallel and half toed-in cameras; cameras aimed at the arm reverse it",
-        ),
-    }

@@ -2,33 +2,23 @@
 14), blur, darkness and noise, and faults of the images themselves.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.random import Generator
 from numpy.typing import NDArray
 
-from soro_lib.papers.soft_handover.experiments.vision import (
-    NO_SENSOR_NOISE,
-    Report,
-    ball_before,
-    nothing,
-    random_states,
-)
+from soro_lib.papers.soft_handover.experiments import vision
+from soro_lib.papers.soft_handover.experiments.vision import SCENE
+from soro_lib.papers.soft_handover.world import scene
 from soro_lib.papers.soft_handover.world.observer import calibrate_on_box
-from soro_lib.papers.soft_handover.world.scene import (
-    BRIO,
-    STEREO,
-    WEBCAM,
-    Extras,
-    HandoverScene,
-    Viewpoint,
-    photograph,
-    stereo_pair,
-)
+from soro_lib.papers.soft_handover.world.plant import Array
+from soro_lib.papers.soft_handover.world.scene import STEREO, WEBCAM, Extras, photographs
 from soro_lib.sensing.camera import Image, invert_pose, transform_points
-from soro_lib.sensing.handover_observation import HandoverObservation
 from soro_lib.sensing.handover_vision import ESTIMATORS, HandoverVision
 from soro_lib.sensing.stereo_vision import CalibratedCamera
 
@@ -36,7 +26,7 @@ BALL_RULES = {"largest piece": "thesis", "joined pieces": "joint"}
 """How a hidden ball is measured, and the estimator that does it so."""
 
 
-def occlusion(count: int, seed: int, report: Report = nothing) -> pd.DataFrame:
+def occlusion(count: int, seed: int) -> pd.DataFrame:
     """Return how well a ball between the fingers is located, against how much of it can be seen (Fig. 15).
 
     Half of the balls lie between the open fingers (10 mm per axis off the gripper point), half farther below.
@@ -52,37 +42,28 @@ def occlusion(count: int, seed: int, report: Report = nothing) -> pd.DataFrame:
         case = hidden_ball(pose, seed)
         for rule, estimator in BALL_RULES.items():
             seen = HandoverVision(case.cameras, estimator, track=False).look(case.pictures).observation
-            error = np.full(3, np.nan) if seen.ball is None else 1e3 * (seen.ball - case.ball)
-            rows.append(
-                {
-                    "pose": pose,
-                    "rule": rule,
-                    "visible": case.visible,
-                    **{f"ball_{axis}_mm": value for axis, value in zip("xyz", error)},
-                    "ball_mm": float(np.linalg.norm(error)),
-                    "gap_mm": 1e3 * seen.disagreement,
-                    "claimed_mm": 1e3 * seen.ball_deviation,
-                }
-            )
-        report(1)
+            errors = vision.look_errors(case.state, case.ball, seen, None)
+            ball = {name: errors[name] for name in ("ball_x_mm", "ball_y_mm", "ball_z_mm", "ball_mm")}
+            claims = {"gap_mm": 1e3 * seen.disagreement, "claimed_mm": 1e3 * seen.ball_deviation}
+            rows.append({"pose": pose, "rule": rule, "visible": case.visible, **ball, **claims})
     return pd.DataFrame(rows)
 
 
-@dataclass(frozen=True)
-class HiddenBall:
+class HiddenBall(NamedTuple):
     """A ball that the gripper may hide in part.
 
     Attributes
     ----------
-    ball : ndarray, shape (3,)
-        Its true place [m].
+    state, ball : ndarray, shape (9,) and (3,)
+        The true arm, and the true place of the ball [m].
     cameras : list of CalibratedCamera
     pictures : list of images
     visible : float
         Visible share, the smaller of the cameras.
     """
 
-    ball: NDArray[np.float64]
+    state: Array
+    ball: Array
     cameras: list[CalibratedCamera]
     pictures: list[Image]
     visible: float
@@ -90,27 +71,24 @@ class HiddenBall:
 
 def hidden_ball(pose: int, seed: int) -> HiddenBall:
     """Return one of the balls of :func:`occlusion`; every odd one lies between the fingers."""
-    scene = HandoverScene()
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(pose,)))
-    state = random_states(1, rng)[0]
-    gripper = scene.arm.tip_points(state)[3:]
-    ball = gripper + 0.010 * rng.standard_normal(3) if pose % 2 else ball_before(gripper, rng)
+    state = vision.random_states(1, rng)[0]
+    gripper = SCENE.arm.tip_points(state)[3:]
+    ball = gripper + 0.010 * rng.standard_normal(3) if pose % 2 else vision.ball_before(gripper, rng)
     cameras = calibrate_on_box(STEREO, rng)
-    items = scene.items(state, ball)
-    pictures = [photograph(items, view, WEBCAM, rng) for view in STEREO]
-    visible = min(visible_share(scene, state, ball, view) for view in STEREO)
-    return HiddenBall(ball, cameras, pictures, visible)
+    pictures = photographs(SCENE.items(state, ball), STEREO, WEBCAM, rng)
+    visible = min(visible_share(state, ball, view) for view in STEREO)
+    return HiddenBall(state, ball, cameras, pictures, visible)
 
 
-def visible_share(
-    scene: HandoverScene, state: NDArray[np.float64], ball: NDArray[np.float64], view: Viewpoint
-) -> float:
+def visible_share(state: Array, ball: Array, view: CalibratedCamera) -> float:
     """Return the share of the ball's pixels that a camera sees, counted in pictures with and without the
     rest."""
-    still, clean = np.random.default_rng(0), replace(NO_SENSOR_NOISE, blur=0.0)
-    empty = photograph([], view, clean, still).astype(int)
-    alone = photograph([scene.ball(ball)], view, clean, still).astype(int)
-    together = photograph(scene.items(state, ball), view, clean, still).astype(int)
+    still, clean = np.random.default_rng(0), replace(vision.NO_SENSOR_NOISE, blur=0.0)
+    empty, alone, together = (
+        scene.photograph(items, view, clean, still).astype(int)
+        for items in ([], [SCENE.ball(ball)], SCENE.items(state, ball))
+    )
     of_ball = np.abs(alone - empty).max(axis=-1) > 0
     kept = np.abs(alone - together).max(axis=-1)[of_ball] <= 2
     return float(kept.mean()) if kept.size else 0.0
@@ -124,7 +102,7 @@ TOE_IN = {"parallel": 0.0, "half toed in": 0.5, "aimed at the arm": 1.0}
 
 
 def workspace(
-    toe_in: float = 0.5, focal_length: float = BRIO.focal_length, step: float = 0.02
+    toe_in: float = 0.5, focal_length: float = scene.BRIO.focal_length, step: float = 0.02
 ) -> pd.DataFrame:
     """Return which cameras see ring and ball, for every place of the gripper on a grid (Fig. 14).
 
@@ -136,21 +114,17 @@ def workspace(
     DataFrame
         x_mm, y_mm, z_mm (gripper point in `arm_base`), left, right (whether each camera sees it).
     """
-    camera = replace(BRIO, focal_length=focal_length)
-    grid = np.stack(
-        np.meshgrid(
-            np.arange(-0.80, 0.801, step), (-0.2, 0.0, 0.2), np.arange(0.30, 1.001, step), indexing="ij"
-        ),
-        axis=-1,
-    ).reshape(-1, 3)
-    sides = [(x, y, z) for x in (-0.03, 0.03) for y in (0.0,) for z in (-0.115, 0.02)]
+    camera = replace(scene.BRIO, focal_length=focal_length)
+    axes = np.arange(-0.80, 0.801, step), (-0.2, 0.0, 0.2), np.arange(0.30, 1.001, step)
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    sides = [(x, 0.0, z) for x in (-0.03, 0.03) for z in (-0.115, 0.02)]
     columns = {f"{axis}_mm": 1e3 * values for axis, values in zip("xyz", grid.T)}
-    for name, view in zip(("left", "right"), stereo_pair(toe_in=toe_in, camera=camera)):
+    for name, view in zip(("left", "right"), scene.stereo_pair(toe_in=toe_in, camera=camera)):
         columns[name] = np.logical_and.reduce([in_picture(view, grid + side) for side in sides])
     return pd.DataFrame(columns)
 
 
-def in_picture(view: Viewpoint, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def in_picture(view: CalibratedCamera, points: Array) -> NDArray[np.bool_]:
     """Return for every point (n, 3) [m] whether it lies in a camera's picture."""
     seen = transform_points(invert_pose(view.pose), points)
     ahead = (seen[:, 2] > 0.1) & (np.hypot(*seen[:, :2].T) < view.camera.reach * seen[:, 2])
@@ -166,33 +140,22 @@ def workspace_limits(step: float = 0.02) -> pd.DataFrame:
     left side.
     """
     rows = []
-    for angle, focal_length in FIELDS_OF_VIEW.items():
-        for aim, toe_in in TOE_IN.items():
-            table = workspace(toe_in, focal_length, step)
-            table["both"] = table["left"] & table["right"]
-            for depth, near in table.groupby("y_mm"):
-                level = near[np.isclose(near["z_mm"], 700.0, atol=1e3 * step / 2 - 1e-6)]
-                reach = level.loc[level["both"], "x_mm"]
-                rows.append(
-                    {
-                        "field_of_view": angle,
-                        "cameras": aim,
-                        "toward_cameras_mm": depth,
-                        "left_mm": reach.min(),
-                        "right_mm": reach.max(),
-                        "limit": limiting_camera(level),
-                        "area_m2": near["both"].sum() * step**2,
-                    }
-                )
+    for (angle, focal_length), (aim, toe_in) in product(FIELDS_OF_VIEW.items(), TOE_IN.items()):
+        table = workspace(toe_in, focal_length, step)
+        for depth, near in table.groupby("y_mm"):
+            level = near[np.isclose(near["z_mm"], 700.0, atol=1e3 * step / 2 - 1e-6)]
+            reach = level.loc[level["left"] & level["right"], "x_mm"]
+            sides = {"left_mm": reach.min(), "right_mm": reach.max(), "limit": limiting_camera(level)}
+            area = (near["left"] & near["right"]).sum() * step**2
+            view = {"field_of_view": angle, "cameras": aim, "toward_cameras_mm": depth}
+            rows.append({**view, **sides, "area_m2": area})
     return pd.DataFrame(rows)
 
 
 def limiting_camera(level: pd.DataFrame) -> str:
     """Return which camera does not see the place just left of what both see: "left", "right" or "both"."""
     places = level.sort_values("x_mm").reset_index(drop=True)
-    seen = (
-        places.index[places["both"]] if "both" in places else places.index[places["left"] & places["right"]]
-    )
+    seen = places.index[places["left"] & places["right"]]
     if not len(seen) or seen[0] == 0:
         return ""
     outside = places.loc[seen[0] - 1]
@@ -217,7 +180,7 @@ DEGRADATIONS = {
 """Pictures worse than ordinary: blur of lens and movement, light, noise [grey levels]."""
 
 
-def degradations(count: int, seed: int, report: Report = nothing) -> pd.DataFrame:
+def degradations(count: int, seed: int) -> pd.DataFrame:
     """Return how well arm and ball are located in bad pictures, the same poses in all.
 
     Returns
@@ -225,52 +188,20 @@ def degradations(count: int, seed: int, report: Report = nothing) -> pd.DataFram
     DataFrame
         degradation, estimator, pose, markers, gripper_mm, ball_mm (NaN where not found).
     """
-    scene = HandoverScene()
     rows = []
-    for pose, sequence in enumerate(np.random.SeedSequence(seed).spawn(count)):
-        rng = np.random.default_rng(sequence)
-        state = random_states(1, rng)[0]
-        ball = ball_before(scene.arm.tip_points(state)[3:], rng)
+    for pose, rng in vision.poses(count, seed):
+        state, ball = vision.approach(rng)
         cameras = calibrate_on_box(STEREO, rng)
-        items = scene.items(state, ball)
+        items = SCENE.items(state, ball)
         for name, photometry in DEGRADATIONS.items():
-            pictures = [photograph(items, view, photometry, rng) for view in STEREO]
-            for estimator, seen, markers in _looks(cameras, pictures):
-                gripper, place = _misses(scene, state, ball, seen)
-                rows.append(
-                    {
-                        "degradation": name,
-                        "estimator": estimator,
-                        "pose": pose,
-                        "markers": markers,
-                        "gripper_mm": gripper,
-                        "ball_mm": place,
-                    }
-                )
-        report(1)
+            pictures = photographs(items, STEREO, photometry, rng)
+            for estimator in ESTIMATORS:
+                look = HandoverVision(cameras, estimator, track=False).look(pictures)
+                row = {"degradation": name, "estimator": estimator, "pose": pose}
+                errors = vision.look_errors(state, ball, look.observation, look.observation)
+                row |= {"markers": sum(map(len, look.markers))}
+                rows.append(row | {what: errors[what] for what in ("gripper_mm", "ball_mm")})
     return pd.DataFrame(rows)
-
-
-def _looks(
-    cameras: Sequence[CalibratedCamera], pictures: Sequence[Image | None]
-) -> Iterator[tuple[str, HandoverObservation, int]]:
-    for estimator in ESTIMATORS:
-        look = HandoverVision(cameras, estimator, track=False).look(pictures)
-        yield estimator, look.observation, sum(map(len, look.markers))
-
-
-def _misses(
-    scene: HandoverScene, state: NDArray[np.float64], ball: NDArray[np.float64], seen: HandoverObservation
-) -> tuple[float, float]:
-    """Return how far gripper and ball are from where they are seen [mm], NaN where they are not."""
-    truth = scene.arm.tip_points(state)[3:]
-    gripper = place = np.nan
-    if seen.wrist is not None and seen.direction is not None:
-        found = seen.wrist + scene.arm.gripper_length * seen.direction
-        gripper = 1e3 * float(np.linalg.norm(found - truth))
-    if seen.ball is not None:
-        place = 1e3 * float(np.linalg.norm(seen.ball - ball))
-    return gripper, place
 
 
 @dataclass(frozen=True)
@@ -309,7 +240,7 @@ LOCATED = 15.0
 """Largest error of a gripper or ball that counts as located [mm]."""
 
 
-def image_faults(count: int, seed: int, report: Report = nothing) -> pd.DataFrame:
+def image_faults(count: int, seed: int) -> pd.DataFrame:
     """Return what becomes of arm and ball under every fault, in the second of two looks 30 mm apart.
 
     Returns
@@ -317,47 +248,35 @@ def image_faults(count: int, seed: int, report: Report = nothing) -> pd.DataFram
     DataFrame
         fault, estimator, pose, gripper, ball ("located" within 15 mm, "refused", "wrong"), status.
     """
-    scene = HandoverScene()
     rows = []
-    for pose, sequence in enumerate(np.random.SeedSequence(seed).spawn(count)):
-        rng = np.random.default_rng(sequence)
-        before, now = moved_apart(scene, rng)
-        ball = ball_before(scene.arm.tip_points(now)[3:], rng)
+    for pose, rng in vision.poses(count, seed):
+        before, now = moved_apart(rng)
+        ball = vision.ball_before(SCENE.arm.tip_points(now)[3:], rng)
         cameras = calibrate_on_box(STEREO, rng)
         for fault in IMAGE_FAULTS:
-            first = [photograph(scene.items(before, ball), view, WEBCAM, rng) for view in STEREO]
-            items = scene.items(now, ball, fault.extras)
-            second = [photograph(items, view, WEBCAM, rng) for view in STEREO]
+            first = photographs(SCENE.items(before, ball), STEREO, WEBCAM, rng)
+            second = photographs(SCENE.items(now, ball, fault.extras), STEREO, WEBCAM, rng)
             for estimator in ESTIMATORS:
-                vision = HandoverVision(cameras, estimator)
-                vision.look(first)
-                seen = vision.look(fault.spoil(second, first)).observation
-                gripper, place = _misses(scene, now, ball, seen)
-                rows.append(
-                    {
-                        "fault": fault.name,
-                        "estimator": estimator,
-                        "pose": pose,
-                        "gripper": _verdict(gripper),
-                        "ball": _verdict(place),
-                        "status": seen.status,
-                    }
-                )
-        report(1)
+                eyes = HandoverVision(cameras, estimator)
+                eyes.look(first)
+                seen = eyes.look(fault.spoil(second, first)).observation
+                errors = vision.look_errors(now, ball, seen, seen)
+                row = {"fault": fault.name, "estimator": estimator, "pose": pose}
+                row |= {what: verdict(errors[f"{what}_mm"]) for what in ("gripper", "ball")}
+                rows.append({**row, "status": seen.status})
     return pd.DataFrame(rows)
 
 
-def moved_apart(
-    scene: HandoverScene, rng: np.random.Generator, distance: float = 0.03
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def moved_apart(rng: Generator, distance: float = 0.03) -> tuple[Array, Array]:
     """Return two true states (9,) whose grippers are about a distance [m] apart."""
-    state, direction = random_states(1, rng)[0], 0.05 * rng.standard_normal(9)
+    state, direction = vision.random_states(1, rng)[0], 0.05 * rng.standard_normal(9)
     direction[2::3] = 0.0
-    move = np.linalg.norm(scene.arm.tip_points(state + direction)[3:] - scene.arm.tip_points(state)[3:])
+    move = np.linalg.norm(SCENE.arm.tip_points(state + direction)[3:] - SCENE.arm.tip_points(state)[3:])
     return state, state + direction * distance / move
 
 
-def _verdict(miss: float) -> str:
+def verdict(miss: float) -> str:
+    """Return what became of something whose error is known [mm], NaN where it was not seen."""
     if np.isnan(miss):
         return "refused"
     return "located" if miss <= LOCATED else "wrong"

@@ -1,1 +1,1 @@
-"""Figures of the handover thesis: ``handovers`` and, on its cameras, ``vision``."""
+"""The figures: ``handovers`` draws arms and runs, ``vision`` what the cameras see and miss; no simulation."""

@@ -3,8 +3,8 @@
 Lengths in mm, times in seconds of the thesis's timestep where they stand beside its figures, steps elsewhere.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from soro_lib.arcs import backbone
 from soro_lib.papers.soft_handover.experiments.handover import HandoverRun
 from soro_lib.papers.soft_handover.experiments.use_case import Carry
+from soro_lib.papers.soft_handover.world.plant import Array
 from soro_lib.replication.plotting import (
     COLORS,
     ESTIMATE,
@@ -38,6 +39,15 @@ MEASURED: dict[str, Any] = {**MEASUREMENT, "linestyle": "-", "marker": "none", "
 PLANT_COLORS = {"K": COLORS["blue"], "E": COLORS["vermillion"]}
 """The two plants."""
 
+THRESHOLD: dict[str, Any] = {**REFERENCE, "label": "stop threshold"}
+"""The error at which the gripper closes or goes down."""
+
+GREY_THRESHOLD: dict[str, Any] = {**THRESHOLD, "color": COLORS["grey"]}
+"""The same beside curves of the usual colour."""
+
+BOWL = np.array([(-80, 0), (-60, -50), (60, -50), (80, 0)])
+"""The outline of the bowl around the middle of its opening [mm]."""
+
 OUTCOME_COLORS = {
     "handover": COLORS["green"],
     "safe stop": COLORS["sky"],
@@ -47,7 +57,7 @@ OUTCOME_COLORS = {
 """What a run came to."""
 
 
-def side_view(points: NDArray[np.float64], heading: NDArray[np.float64]) -> NDArray[np.float64]:
+def side_view(points: Array, heading: Array) -> Array:
     """Return points (n, 3) of `arm_base` seen from the side: along a horizontal heading (2,) and up, in mm
     (n, 2)."""
     upright = 1e3 * origin_from_arm_base(points)
@@ -55,20 +65,25 @@ def side_view(points: NDArray[np.float64], heading: NDArray[np.float64]) -> NDAr
     return np.column_stack([along, upright[:, 2]])
 
 
-def draw_arm(
-    axes: Any,
-    arm: HelixArm,
-    state: NDArray[np.float64],
-    heading: NDArray[np.float64],
-    style: Mapping[str, Any],
-    label: str,
+SHAPES = {"commanded": COMMANDED, "estimated": ESTIMATE, "true": TRUTH}
+"""How the shapes of the arm are drawn, from behind to the front."""
+
+
+def draw_moment(
+    axes: Any, arm: HelixArm, heading: Array, states: Mapping[str, Array], ball: Array, size: float
 ) -> None:
-    """Draw backbone, gripper and joints of a state (9,), seen from the side."""
-    segments = state.reshape(3, 3)
-    line = np.concatenate([backbone(segments, 20), arm.tip_points(state)[None, 3:]])
-    joints = np.stack([backbone(segments[: i + 1], 2)[-1] for i in range(3)])
-    axes.plot(*side_view(line, heading).T, **style, label=label)
-    axes.plot(*side_view(joints, heading).T, linestyle="none", marker="o", markersize=3, color=style["color"])
+    """Draw backbone, gripper and joints of the states (9,) that are known, and a ball (3,), from the side."""
+    for name, style in SHAPES.items():
+        if name in states and np.isfinite(states[name]).all():
+            segments = states[name].reshape(3, 3)
+            line = np.concatenate([backbone(segments, 20), arm.tip_points(states[name])[None, 3:]])
+            joints = np.stack([backbone(segments[: i + 1], 2)[-1] for i in range(3)])
+            axes.plot(*side_view(line, heading).T, **style, label=name)
+            dots = {"linestyle": "none", "marker": "o", "markersize": 3, "color": style["color"]}
+            axes.plot(*side_view(joints, heading).T, **dots)
+    dot = {"linestyle": "none", "marker": "o", "markersize": size, "color": COLORS["green"]}
+    axes.plot(*side_view(ball[None], heading).T, **dot, label="ball")
+    axes.set_aspect("equal")
 
 
 def evolution(arm: HelixArm, run: HandoverRun, moments: Mapping[str, int]) -> Figure:
@@ -83,48 +98,56 @@ def evolution(arm: HelixArm, run: HandoverRun, moments: Mapping[str, int]) -> Fi
     """
     figure, panels = new_figure(PAGE_WIDTH, 4.2, 1, len(moments), sharey=True, sharex=True)
     heading = run.ball[:2] / np.linalg.norm(run.ball[:2])
-    ball = side_view(run.ball[None], heading)
-    for axes, (title, step) in zip(np.atleast_1d(panels), moments.items()):
-        draw_arm(axes, arm, run.commands[step], heading, COMMANDED, "commanded")
-        if np.isfinite(run.estimates[step]).all():
-            draw_arm(axes, arm, run.estimates[step], heading, ESTIMATE, "estimated")
-        draw_arm(axes, arm, run.states[step], heading, TRUTH, "true")
-        axes.plot(*ball.T, linestyle="none", marker="o", markersize=9, color=COLORS["green"], label="ball")
-        axes.set_aspect("equal")
+    shapes = {"commanded": run.commands, "estimated": run.estimates, "true": run.states}
+    for axes, (title, step) in zip(panels, moments.items()):
+        states = {name: shape[step] for name, shape in shapes.items()}
+        draw_moment(axes, arm, heading, states, run.ball, 9)
         label_axes(axes, "towards the ball [mm]", title=f"{title} (step {step})")
-    label_axes(np.atleast_1d(panels)[0], y="up [mm]")
+    label_axes(panels[0], y="up [mm]")
     legend(figure)
     return figure
 
 
-def fig13_use_case(arm: HelixArm, run: HandoverRun, carry: Carry, release: NDArray[np.float64]) -> Figure:
+def fig13_use_case(arm: HelixArm, run: HandoverRun, carry: Carry, release: Array) -> Figure:
     """Draw the arm as it takes the ball, carries it and lets it go over the bowl, seen along y (Fig. 13)."""
     figure, panels = new_figure(PAGE_WIDTH, 4.0, 1, 4, sharey=True, sharex=True)
     heading = np.array([1.0, 0.0])
-    moments = {
-        "start": (run.states[0], run.commands[0]),
-        "taken": (run.states[-1], run.commands[-1]),
-        "on the way": (carry.states[carry.steps // 3], carry.commands[carry.steps // 3]),
-        "let go": (carry.states[-1], carry.commands[-1]),
-    }
     in_gripper = run.ball - arm.tip_points(run.state)[3:]
-    bowl = side_view(release[None] + [0, 0, 0.08], heading)[0]
-    for axes, (title, (state, command)) in zip(panels, moments.items()):
-        held = run.ball if title == "start" else arm.tip_points(state)[3:] + in_gripper
-        draw_arm(axes, arm, command, heading, COMMANDED, "commanded")
-        draw_arm(axes, arm, state, heading, TRUTH, "true")
-        ball = side_view(held[None], heading)
-        axes.plot(*ball.T, linestyle="none", marker="o", markersize=7, color=COLORS["green"], label="ball")
-        axes.plot(
-            bowl[0] + np.array([-80, -60, 60, 80]),
-            bowl[1] + np.array([0, -50, -50, 0]),
-            color=COLORS["grey"],
-            label="bowl",
-        )
-        axes.set_aspect("equal")
+    bowl = side_view(release[None] + [0, 0, 0.08], heading) + BOWL
+    moments: dict[str, tuple[HandoverRun | Carry, int]] = {
+        "start": (run, 0),
+        "taken": (run, -1),
+        "on the way": (carry, carry.steps // 3),
+        "let go": (carry, -1),
+    }
+    for axes, (title, (part, step)) in zip(panels, moments.items()):
+        state = part.states[step]
+        ball = run.ball if title == "start" else arm.tip_points(state)[3:] + in_gripper
+        draw_moment(axes, arm, heading, {"commanded": part.commands[step], "true": state}, ball, 7)
+        axes.plot(*bowl.T, color=COLORS["grey"], label="bowl")
         label_axes(axes, "x [mm]", title=title)
     label_axes(panels[0], y="up [mm]")
     legend(figure)
+    return figure
+
+
+def panel_per_plant(
+    table: pd.DataFrame,
+    draw: Callable[[Any, pd.DataFrame], None],
+    x: str,
+    y: str,
+    note: str = "",
+    height: float = 3.0,
+    **options: Any,
+) -> Figure:
+    """Draw the rows of every plant in a panel of its own, by a function of axes and rows; options go to the
+    legend."""
+    plants = table["plant"].unique()
+    figure, panels = new_figure(PAGE_WIDTH, height, 1, len(plants), sharey=True)
+    for axes, plant in zip(np.atleast_1d(panels), plants):
+        draw(axes, table[table["plant"] == plant])
+        label_axes(axes, x, y, title=f"Plant {plant}{note}")
+    legend(figure, **options)
     return figure
 
 
@@ -136,139 +159,132 @@ def mean_over_runs(traces: pd.DataFrame, column: str) -> pd.DataFrame:
     return pd.DataFrame({"mean": steps.mean(), "sd": steps.std(ddof=0)}).reset_index()
 
 
-def draw_mean(
-    axes: Any, traces: pd.DataFrame, column: str, timestep: float, style: Mapping[str, Any], label: str
-) -> None:
-    """Draw the mean of a column over time with its standard deviation."""
-    curve = mean_over_runs(traces, column)
-    time = timestep * curve["step"]
-    axes.plot(time, curve["mean"], **style, label=label)
-    error_band(axes, time, curve["mean"] - curve["sd"], curve["mean"] + curve["sd"], style["color"])
+class Curve(NamedTuple):
+    """What is averaged over runs: a column of their traces [mm], the duration of a step, and its looks."""
+
+    traces: pd.DataFrame
+    column: str
+    timestep: float
+    style: Mapping[str, Any]
+    label: str
+
+
+def over_time(
+    curves: Sequence[Curve],
+    x: str = "time [s]",
+    y: str = "error to the goal [mm]",
+    *,
+    single: pd.DataFrame | None = None,
+    threshold: Mapping[str, Any] | None = THRESHOLD,
+    **options: Any,
+) -> Figure:
+    """Draw means with their standard deviations over time, after some single runs."""
+
+    def draw(axes: Any, rows: pd.DataFrame) -> None:
+        plant = rows["plant"].iloc[0]
+        if single is not None:
+            for number, run in single[single["plant"] == plant].groupby("run"):
+                label = "" if number else "one block of eight runs"
+                time = curves[0].timestep * run["step"]
+                axes.plot(time, run["error_mm"], color=COLORS["grey"], linewidth=0.7, label=label)
+        for traces, column, timestep, style, label in curves:
+            mean = mean_over_runs(traces[traces["plant"] == plant], column)
+            time, middle = timestep * mean["step"], mean["mean"]
+            axes.plot(time, middle, **style, label=label)
+            error_band(axes, time, middle - mean["sd"], middle + mean["sd"], style["color"])
+        if threshold is None:
+            axes.set_ylim(bottom=0)
+        else:
+            axes.axhline(50, **threshold)
+
+    return panel_per_plant(curves[0].traces, draw, x, y, **options)
 
 
 def fig07_single_runs(traces: pd.DataFrame, timestep: float, step_size: float) -> Figure:
-    """Draw the error of eight single runs and of the mean over all (Figs. 7, 16 and 17), one panel per
-    plant."""
-    plants = traces["plant"].unique()
-    figure, panels = new_figure(PAGE_WIDTH, 3.0, 1, len(plants), sharey=True)
-    for axes, plant in zip(np.atleast_1d(panels), plants):
-        chosen = traces[(traces["plant"] == plant) & (traces["alpha"] == step_size)]
-        for number, (_, run) in enumerate(chosen[chosen["block"] == 0].groupby("run")):
-            label = "one block of eight runs" if number == 0 else ""
-            axes.plot(
-                timestep * run["step"], run["error_mm"], color=COLORS["grey"], linewidth=0.7, label=label
-            )
-        draw_mean(axes, chosen, "error_mm", timestep, ESTIMATE, "mean and sd of all runs")
-        axes.axhline(50, **REFERENCE, label="stop threshold")
-        label_axes(axes, "time [s]", "error to the goal [mm]", title=f"Plant {plant}, step size {step_size}")
-    legend(figure)
-    return figure
+    """Draw the error of eight single runs and of the mean over all (Figs. 7, 16 and 17)."""
+    runs = traces[traces["alpha"] == step_size]
+    mean = Curve(runs, "error_mm", timestep, ESTIMATE, "mean and sd of all runs")
+    return over_time([mean], single=runs[runs["block"] == 0], note=f", step size {step_size}")
 
 
 def fig08_step_sizes(
     traces: pd.DataFrame, timestep: Mapping[float, float], step_sizes: Sequence[float]
 ) -> Figure:
-    """Draw the mean error over time for each step size (Fig. 8), one panel per plant."""
-    plants = traces["plant"].unique()
-    figure, panels = new_figure(PAGE_WIDTH, 3.0, 1, len(plants), sharey=True)
-    for axes, plant in zip(np.atleast_1d(panels), plants):
-        for color, step_size in zip(SERIES, step_sizes):
-            chosen = traces[(traces["plant"] == plant) & (traces["alpha"] == step_size)]
-            style = {"color": color}
-            draw_mean(axes, chosen, "error_mm", timestep[step_size], style, f"step size {step_size}")
-        axes.axhline(50, **REFERENCE, label="stop threshold")
-        label_axes(axes, "time [s]", "error to the goal [mm]", title=f"Plant {plant}")
-    legend(figure)
-    return figure
+    """Draw the mean error over time for each step size (Fig. 8)."""
+    curves = []
+    for color, step_size in zip(SERIES, step_sizes):
+        runs, label = traces[traces["alpha"] == step_size], f"step size {step_size}"
+        curves.append(Curve(runs, "error_mm", timestep[step_size], {"color": color}, label))
+    return over_time(curves)
 
 
 def fig09_commanded_and_measured(traces: pd.DataFrame, timestep: float, step_size: float) -> Figure:
     """Draw the distance of f(q_sys) and of the measured gripper from the calibrated place (Figs. 9, 18 and
     20)."""
-    return _two_distances(traces, timestep, step_size, "commanded", COMMANDED, "commanded, f(q_sys)")
+    return _two_distances(traces, timestep, step_size, "commanded", "commanded, f(q_sys)")
 
 
 def fig10_estimated_and_measured(traces: pd.DataFrame, timestep: float, step_size: float) -> Figure:
     """Draw the distance of f(q_est) and of the measured gripper from the calibrated place (Figs. 10, 19 and
     21)."""
-    return _two_distances(traces, timestep, step_size, "estimated", ESTIMATE, "estimated, f(q_est)")
+    return _two_distances(traces, timestep, step_size, "estimated", "estimated, f(q_est)")
 
 
-def _two_distances(
-    traces: pd.DataFrame, timestep: float, step_size: float, which: str, style: Mapping[str, Any], label: str
-) -> Figure:
-    plants = traces["plant"].unique()
-    figure, panels = new_figure(PAGE_WIDTH, 3.0, 1, len(plants), sharey=True)
-    for axes, plant in zip(np.atleast_1d(panels), plants):
-        chosen = traces[(traces["plant"] == plant) & (traces["alpha"] == step_size)]
-        draw_mean(axes, chosen, f"{which}_mm", timestep, style, label)
-        draw_mean(axes, chosen, "measured_mm", timestep, MEASURED, "measured")
-        draw_mean(axes, chosen, f"{which}_gap_mm", timestep, {"color": COLORS["green"]}, "between the two")
-        axes.set_ylim(bottom=0)
-        label_axes(
-            axes, "time [s]", "from the calibrated place [mm]", title=f"Plant {plant}, step size {step_size}"
-        )
-    legend(figure)
-    return figure
+def _two_distances(traces: pd.DataFrame, timestep: float, step_size: float, which: str, label: str) -> Figure:
+    runs = traces[traces["alpha"] == step_size]
+    curves = [
+        Curve(runs, f"{which}_mm", timestep, SHAPES[which], label),
+        Curve(runs, "measured_mm", timestep, MEASURED, "measured"),
+        Curve(runs, f"{which}_gap_mm", timestep, {"color": COLORS["green"]}, "between the two"),
+    ]
+    y, note = "from the calibrated place [mm]", f", step size {step_size}"
+    return over_time(curves, y=y, note=note, threshold=None)
 
 
 def fig12_guidance(
     automated: pd.DataFrame, guided: pd.DataFrame, timestep: float, step_size: float
 ) -> Figure:
-    """Draw the error of automated handovers beside two guided ones (Figs. 12 and 22), one panel per plant."""
-    plants = automated["plant"].unique()
-    figure, panels = new_figure(PAGE_WIDTH, 3.0, 1, len(plants), sharey=True)
-    for axes, plant in zip(np.atleast_1d(panels), plants):
-        alone = automated[(automated["plant"] == plant) & (automated["alpha"] == step_size)]
-        led = guided[(guided["plant"] == plant) & (guided["alpha"] == step_size)]
-        draw_mean(axes, alone, "error_mm", timestep, ESTIMATE, "automated")
-        draw_mean(axes, led, "error_mm", timestep, {"color": COLORS["vermillion"]}, "guided by a hand")
-        axes.axhline(50, **{**REFERENCE, "color": COLORS["grey"]}, label="stop threshold")
-        label_axes(axes, "time [s]", "error to the goal [mm]", title=f"Plant {plant}, step size {step_size}")
-    legend(figure)
-    return figure
+    """Draw the error of automated handovers beside guided ones (Figs. 12 and 22)."""
+    alone, led = (traces[traces["alpha"] == step_size] for traces in (automated, guided))
+    curves = [
+        Curve(alone, "error_mm", timestep, ESTIMATE, "automated"),
+        Curve(led, "error_mm", timestep, {"color": COLORS["vermillion"]}, "guided by a hand"),
+    ]
+    return over_time(curves, threshold=GREY_THRESHOLD, note=f", step size {step_size}")
+
+
+def without_estimation(traces: pd.DataFrame, step_size: float) -> Figure:
+    """Draw the error with and without the state optimisation."""
+    seen = traces[traces["alpha"] == step_size].dropna(subset="error_mm")
+    curves = [
+        Curve(seen[seen["estimated"]], "error_mm", 1.0, ESTIMATE, "with state optimisation"),
+        Curve(seen[~seen["estimated"]], "error_mm", 1.0, {"color": COLORS["vermillion"]}, "without"),
+    ]
+    return over_time(curves, "step", threshold=GREY_THRESHOLD, note=f", step size {step_size}", height=2.8)
 
 
 def success_over_opening(table: pd.DataFrame) -> Figure:
-    """Draw the success rate over how far from the gripper point a ball may lie, one panel per plant."""
-    plants = table["plant"].unique()
-    figure, panels = new_figure(PAGE_WIDTH, 2.6, 1, len(plants), sharey=True)
-    for axes, plant in zip(np.atleast_1d(panels), plants):
-        for color, (alpha, group) in zip(SERIES, table[table["plant"] == plant].groupby("alpha")):
-            axes.plot(
-                group["opening_mm"],
-                100 * group["success"],
-                color=color,
-                marker="o",
-                label=f"step size {alpha}",
-            )
+    """Draw the success rate over how far from the gripper point a ball may lie."""
+
+    def draw(axes: Any, rows: pd.DataFrame) -> None:
+        for color, (alpha, group) in zip(SERIES, rows.groupby("alpha")):
+            success = 100 * group["success"]
+            axes.plot(group["opening_mm"], success, color=color, marker="o", label=f"step size {alpha}")
         axes.axvline(40, **REFERENCE, label="assumed here")
-        label_axes(axes, "catches within [mm]", "success [%]", title=f"Plant {plant}")
-    legend(figure)
-    return figure
+
+    return panel_per_plant(table, draw, "catches within [mm]", "success [%]", height=2.6)
 
 
 def error_floor(table: pd.DataFrame) -> Figure:
     """Draw where the error rests without noise against the bound over the step size."""
     figure, axes = new_figure(PAGE_WIDTH * 0.62, 3.2)
-    styles = {
-        "all 20 iterations": ("o", "blue"),
-        "early exit": ("^", "orange"),
-        "no error floor": ("s", "green"),
-    }
-    for loop, (marker, color) in styles.items():
-        rows = table[table["loop"] == loop]
-        axes.plot(
-            rows["predicted_mm"],
-            rows["floor_mm"],
-            linestyle="none",
-            marker=marker,
-            color=COLORS[color],
-            label=loop,
-        )
+    looks = (("o", "blue"), ("^", "orange"), ("s", "green"))
+    for (marker, color), (loop, rows) in zip(looks, table.groupby("loop", sort=False)):
+        style = {"linestyle": "none", "marker": marker, "color": COLORS[color], "label": loop}
+        axes.plot(rows["predicted_mm"], rows["floor_mm"], **style)
     line = np.array([0, table["predicted_mm"].max()])
-    axes.plot(line, line, **{**REFERENCE, "color": COLORS["grey"]}, label="pose bound / step size")
-    axes.axhline(50, **REFERENCE, label="stop threshold")
+    axes.plot(line, line, **{**GREY_THRESHOLD, "label": "pose bound / step size"})
+    axes.axhline(50, **THRESHOLD)
     label_axes(
         axes, "pose bound / step size [mm]", "error at rest [mm]", title="Without noise the error stalls"
     )
@@ -276,69 +292,97 @@ def error_floor(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def grouped_bars(axes: Any, table: pd.DataFrame, by: str, column: str, group: str) -> None:
-    """Draw the median of a column with its 5th to 95th percentile, one bar per label and group (plant)."""
-    labels = list(table[by].unique())
-    groups = list(table[group].unique())
-    height = 0.8 / len(groups)
-    for number, name in enumerate(groups):
-        samples = [table.loc[(table[by] == label) & (table[group] == name), column] for label in labels]
-        middle = np.array([values.median() for values in samples])
-        low, high = (np.array([values.quantile(q) for values in samples]) for q in (0.05, 0.95))
-        place = np.arange(len(labels)) + (number - (len(groups) - 1) / 2) * height
-        axes.barh(
-            place,
-            middle,
-            height=0.9 * height,
-            xerr=np.clip([middle - low, high - middle], 0, None),
-            color=PLANT_COLORS.get(name, SERIES[number]),
-            alpha=0.75,
-            error_kw={"linewidth": 0.8, "ecolor": COLORS["black"]},
-            label=f"plant {name}",
-        )
+def bars_per_plant(axes: Any, table: pd.DataFrame, by: str, column: str) -> None:
+    """Draw one bar per label and plant: the success rate, or the median of a column with its 5th to 95th
+    percentile."""
+    groups = table.groupby([by, "plant"], sort=False)[column]
+    if column == "success":
+        length, spread = groups.mean().mul(100), None
+    else:
+        length = groups.median()
+        spread = [length - groups.quantile(0.05), groups.quantile(0.95) - length]
+    labels, plants = table[by].unique(), table["plant"].unique()
+    height = 0.8 / len(plants)
+    for number, plant in enumerate(plants):
+        place = np.arange(len(labels)) + (number - (len(plants) - 1) / 2) * height
+        bars = {"height": 0.9 * height, "color": PLANT_COLORS[plant], "alpha": 0.75}
+        if spread is not None:
+            bars["xerr"] = np.clip([part.xs(plant, level="plant")[labels] for part in spread], 0, None)
+            bars |= {"error_kw": {"linewidth": 0.8, "ecolor": COLORS["black"]}, "label": f"plant {plant}"}
+        axes.barh(place, length.xs(plant, level="plant")[labels], **bars)
     axes.set_yticks(range(len(labels)), labels)
     axes.invert_yaxis()
 
 
-def success_bars(axes: Any, table: pd.DataFrame, by: str, group: str) -> None:
-    """Draw the success rate, one bar per label and group (plant)."""
-    rates = table.groupby([by, group], sort=False)["success"].mean().mul(100).unstack(group)
-    height = 0.8 / rates.shape[1]
-    for number, name in enumerate(rates.columns):
-        place = np.arange(len(rates)) + (number - (rates.shape[1] - 1) / 2) * height
-        axes.barh(
-            place, rates[name], height=0.9 * height, color=PLANT_COLORS.get(name, SERIES[number]), alpha=0.75
-        )
-    axes.set_yticks(range(len(rates)), [""] * len(rates))
-    axes.set_xlim(0, 100)
-    axes.invert_yaxis()
+def comparison(
+    runs: pd.DataFrame, by: str, columns: Mapping[str, str], rows: str, height: float, ratios: Sequence[float]
+) -> tuple[Figure, NDArray[np.object_]]:
+    """Return bars per plant of some columns by a label, one row of panels per value of `rows`.
+
+    Parameters
+    ----------
+    runs : DataFrame
+    by : str
+        Column of the labels.
+    columns : mapping of str to str
+        Axis label of each column to draw.
+    rows : str
+        Column whose values have a row each; "" for one row of everything.
+    height : float
+        Of a row [in].
+    ratios : sequence of float
+        Relative widths of the panels.
+    """
+    groups = [run for _, run in runs.groupby(rows, sort=False)] if rows else [runs]
+    size = PAGE_WIDTH, height * len(groups)
+    figure, panels = new_figure(*size, len(groups), len(columns), width_ratios=ratios, squeeze=False)
+    for row, group in zip(panels, groups):
+        for axes, column in zip(row, columns):
+            bars_per_plant(axes, group, by, column)
+            if column == "success":
+                axes.set_xlim(0, 100)
+            if axes is not row[0]:
+                axes.set_yticklabels([])
+    for axes, label in zip(panels[-1], columns.values()):
+        label_axes(axes, label)
+    legend(figure)
+    return figure, panels
 
 
 def loop_variants(runs: pd.DataFrame) -> Figure:
     """Draw steps and success of the readings of Algorithm 1, one row of panels per step size."""
-    step_sizes = list(runs["alpha"].unique())
-    figure, panels = new_figure(
-        PAGE_WIDTH, 2.6 * len(step_sizes), len(step_sizes), 2, width_ratios=[2, 1], squeeze=False
-    )
-    for row, step_size in zip(panels, step_sizes):
-        chosen = runs[runs["alpha"] == step_size]
-        grouped_bars(row[0], chosen, "variant", "steps", "plant")
-        success_bars(row[1], chosen, "variant", "plant")
-        label_axes(row[0], "steps, median and 90 % range", title=f"Step size {step_size}")
-        label_axes(row[1], "success [%]")
-    legend(figure)
+    columns = {"steps": "steps, median and 90 % range", "success": "success [%]"}
+    figure, panels = comparison(runs, "variant", columns, "alpha", 2.6, (2, 1))
+    for row, step_size in zip(panels, runs["alpha"].unique()):
+        label_axes(row[0], columns["steps"], title=f"Step size {step_size}")
+        label_axes(row[1], columns["success"])
+    return figure
+
+
+def suggestions(runs: pd.DataFrame) -> Figure:
+    """Draw steps, final miss and success of the suggested improvements on both plants."""
+    columns = {"steps": "steps", "miss_mm": "ball to gripper [mm]", "success": "success [%]"}
+    return comparison(runs, "controller", columns, "", 4.6, (2, 2, 1))[0]
+
+
+def compare_eyes(runs: pd.DataFrame) -> Figure:
+    """Draw steps and final miss through better and better eyes, one row of panels per controller."""
+    columns = {"steps": "steps", "miss_mm": "ball to gripper [mm]"}
+    figure, panels = comparison(runs, "observer", columns, "controller", 1.9, (1, 1))
+    for axes, controller in zip(panels[:, 0], runs["controller"].unique()):
+        label_axes(axes, title=controller)
     return figure
 
 
 def filter_cap(runs: pd.DataFrame, poles: pd.DataFrame) -> Figure:
     """Draw steps and overshoot over the step size with and without the filters, beside the slowest pole."""
     figure, panels = new_figure(PAGE_WIDTH, 2.8, 1, 3)
-    for color, (filters, group) in zip(SERIES, runs.groupby("filters", sort=False)):
-        medians = group.groupby("alpha")[["steps", "overshoot_mm"]].median()
-        panels[0].plot(medians.index, medians["steps"], color=color, marker="o", label=filters)
-        panels[1].plot(medians.index, medians["overshoot_mm"], color=color, marker="o", label=filters)
-    for color, (filters, group) in zip(SERIES, poles.groupby("filters", sort=False)):
-        panels[2].plot(group["step_gain"], group["pole"], color=color, label=filters)
+    medians = runs.groupby(["filters", "alpha"], sort=False)[["steps", "overshoot_mm"]].median()
+    for color, filters in zip(SERIES, runs["filters"].unique()):
+        for axes, column in zip(panels, medians):
+            axes.plot(medians.loc[filters][column], color=color, marker="o", label=filters)
+        pole = poles[poles["filters"] == filters]
+        panels[2].plot(pole["step_gain"], pole["pole"], color=color, label=filters)
     panels[0].set_ylim(bottom=0)
     label_axes(panels[0], "step size [-]", "steps", title="Steps")
     label_axes(panels[1], "step size [-]", "overshoot [mm]", title="Overshoot")
@@ -350,21 +394,16 @@ def filter_cap(runs: pd.DataFrame, poles: pd.DataFrame) -> Figure:
 def estimated_shapes(table: pd.DataFrame) -> Figure:
     """Draw the errors of the estimated shape over the weight of the lengths, one panel per quantity."""
     figure, panels = new_figure(PAGE_WIDTH, 2.8, 1, 3)
-    table = table.assign(length_miss_mm=table["length_error_mm"].abs())
-    weights = sorted(table["length_weight"].unique())
-    for plant, group in table.groupby("plant", sort=False):
-        color = PLANT_COLORS[str(plant)]
-        by_weight = group.groupby("length_weight")
-        panels[0].plot(
-            weights, by_weight["length_miss_mm"].median(), color=color, marker="o", label=f"plant {plant}"
-        )
-        panels[1].plot(weights, by_weight["bend_error_deg"].median(), color=color, marker="o")
-        panels[2].plot(weights, 100 * by_weight["outside"].mean(), color=color, marker="o")
-    for axes, title, label in zip(
-        panels,
-        ("Lengths", "Bending", "Impossible lengths"),
-        ("median error [mm]", "median error [deg]", "outside the limits [%]"),
-    ):
+    sizes = table.assign(length_error_mm=table["length_error_mm"].abs(), outside=100.0 * table["outside"])
+    quantities = {
+        "length_error_mm": ("median", "Lengths", "median error [mm]"),
+        "bend_error_deg": ("median", "Bending", "median error [deg]"),
+        "outside": ("mean", "Impossible lengths", "outside the limits [%]"),
+    }
+    for axes, (column, (statistic, title, label)) in zip(panels, quantities.items()):
+        for plant, group in sizes.groupby("plant", sort=False):
+            by_weight = group.groupby("length_weight")[column].agg(statistic)
+            axes.plot(by_weight, color=PLANT_COLORS[str(plant)], marker="o", label=f"plant {plant}")
         axes.set_xscale("log")
         axes.set_ylim(bottom=0)
         label_axes(axes, "weight of lengths [-]", label, title=title)
@@ -372,127 +411,69 @@ def estimated_shapes(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def without_estimation(traces: pd.DataFrame, step_size: float) -> Figure:
-    """Draw the error with and without the state optimisation, one panel per plant."""
-    plants = traces["plant"].unique()
-    figure, panels = new_figure(PAGE_WIDTH, 2.8, 1, len(plants), sharey=True)
-    for axes, plant in zip(np.atleast_1d(panels), plants):
-        chosen = traces[(traces["plant"] == plant) & (traces["alpha"] == step_size)]
-        for estimated, style, label in (
-            (True, ESTIMATE, "with state optimisation"),
-            (False, {"color": COLORS["vermillion"]}, "without"),
-        ):
-            rows = chosen[chosen["estimated"] == estimated].dropna(subset=["error_mm"])
-            draw_mean(axes, rows, "error_mm", 1.0, style, label)
-        axes.axhline(50, **{**REFERENCE, "color": COLORS["grey"]}, label="stop threshold")
-        label_axes(axes, "step", "error to the goal [mm]", title=f"Plant {plant}, step size {step_size}")
-    legend(figure)
-    return figure
-
-
 def reach_by_heading(table: pd.DataFrame) -> Figure:
-    """Draw steps over the ball's distance aside, on the side of a tendon and opposite one, one panel per
-    plant."""
-    plants = table["plant"].unique()
-    figure, panels = new_figure(PAGE_WIDTH, 2.8, 1, len(plants), sharey=True)
+    """Draw steps over the ball's distance aside, on the side of a tendon and opposite one."""
     sides = {0.0: ("towards a tendon", "blue", "o"), 180.0: ("opposite a tendon", "vermillion", "s")}
-    for axes, plant in zip(np.atleast_1d(panels), plants):
-        for heading, (label, color, marker) in sides.items():
-            rows = table[(table["plant"] == plant) & (table["heading_deg"] == heading)]
-            axes.plot(rows["lateral_mm"], rows["steps"], color=COLORS[color], zorder=2)
-            for closed, face in ((True, COLORS[color]), (False, "white")):
-                shown = rows[rows["closed"] == closed]
+
+    def draw(axes: Any, rows: pd.DataFrame) -> None:
+        for heading, (label, name, marker) in sides.items():
+            color, side = COLORS[name], rows[rows["heading_deg"] == heading]
+            axes.plot(side["lateral_mm"], side["steps"], color=color, zorder=2)
+            for closed, face, suffix in ((True, color, ""), (False, "white", ", never reached")):
+                shown = side[side["closed"] == closed]
+                style = {"marker": marker, "color": color, "markerfacecolor": face, "linestyle": "none"}
                 if len(shown):
-                    name = label if closed else f"{label}, never reached"
-                    style = {"marker": marker, "color": COLORS[color], "markerfacecolor": face}
-                    axes.plot(shown["lateral_mm"], shown["steps"], linestyle="none", label=name, **style)
-        label_axes(axes, "ball aside [mm]", "steps", title=f"Plant {plant}")
-    np.atleast_1d(panels)[0].set_ylim(bottom=0)
-    legend(figure)
-    return figure
+                    axes.plot(shown["lateral_mm"], shown["steps"], **style, label=f"{label}{suffix}")
 
-
-def suggestions(runs: pd.DataFrame) -> Figure:
-    """Draw steps, final miss and success of the suggested improvements on both plants."""
-    figure, panels = new_figure(PAGE_WIDTH, 4.6, 1, 3, width_ratios=[2, 2, 1])
-    grouped_bars(panels[0], runs, "controller", "steps", "plant")
-    grouped_bars(panels[1], runs, "controller", "miss_mm", "plant")
-    success_bars(panels[2], runs, "controller", "plant")
-    panels[1].set_yticklabels([])
-    label_axes(panels[0], "steps")
-    label_axes(panels[1], "ball to gripper [mm]")
-    label_axes(panels[2], "success [%]")
-    legend(figure)
-    return figure
-
-
-def compare_eyes(runs: pd.DataFrame) -> Figure:
-    """Draw steps and final miss through better and better eyes, one row of panels per controller."""
-    controllers = list(runs["controller"].unique())
-    figure, panels = new_figure(PAGE_WIDTH, 1.9 * len(controllers), len(controllers), 2, squeeze=False)
-    for row, controller in zip(panels, controllers):
-        chosen = runs[runs["controller"] == controller]
-        grouped_bars(row[0], chosen, "observer", "steps", "plant")
-        grouped_bars(row[1], chosen, "observer", "miss_mm", "plant")
-        row[1].set_yticklabels([])
-        label_axes(row[0], title=controller)
-    label_axes(panels[-1][0], "steps")
-    label_axes(panels[-1][1], "ball to gripper [mm]")
-    legend(figure)
+    figure = panel_per_plant(table, draw, "ball aside [mm]", "steps", height=2.8)
+    figure.axes[0].set_ylim(bottom=0)
     return figure
 
 
 def loop_speed(runs: pd.DataFrame) -> Figure:
-    """Draw the handover time over the duration of a step, one panel per plant."""
-    plants = runs["plant"].unique()
-    figure, panels = new_figure(PAGE_WIDTH, 3.0, 1, len(plants), sharey=True)
-    dashes = ("-", "--", ":")
-    for axes, plant in zip(np.atleast_1d(panels), plants):
-        chosen = runs[runs["plant"] == plant]
-        for color, (controller, group) in zip(SERIES, chosen.groupby("controller", sort=False)):
-            for dash, (constant, rows) in zip(dashes, group.groupby("time_constant_s")):
-                times = rows.groupby("timestep_s")["time_s"].median()
-                axes.plot(
-                    times.index,
-                    times,
-                    color=color,
-                    linestyle=dash,
-                    marker=".",
-                    label=f"{controller}, arm {constant} s",
-                )
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        label_axes(axes, "duration of a step [s]", "median handover time [s]", title=f"Plant {plant}")
-    legend(figure, ncols=2)
-    return figure
+    """Draw the handover time over the duration of a step."""
+
+    def draw(axes: Any, rows: pd.DataFrame) -> None:
+        for color, (controller, group) in zip(SERIES, rows.groupby("controller", sort=False)):
+            for dash, (constant, times) in zip(("-", "--", ":"), group.groupby("time_constant_s")):
+                style = {"color": color, "linestyle": dash, "marker": "."}
+                label = f"{controller}, arm {constant} s"
+                axes.plot(times.groupby("timestep_s")["time_s"].median(), **style, label=label)
+        axes.set(xscale="log", yscale="log")
+
+    y = "median handover time [s]"
+    return panel_per_plant(runs, draw, "duration of a step [s]", y, ncols=2)
+
+
+def stacked_shares(
+    axes: Any,
+    names: pd.Series,
+    outcomes: pd.Series,
+    colors: Mapping[str, str],
+    shift: float = 0.0,
+    **style: Any,
+) -> None:
+    """Draw a bar per name, in the order of their first appearance: the share of each outcome [%]."""
+    shares = pd.crosstab(names, outcomes, normalize="index")
+    shares = 100 * shares.reindex(index=names.unique(), columns=list(colors), fill_value=0.0)
+    starts = shares.cumsum(axis=1).shift(axis=1, fill_value=0.0)
+    for outcome, color in colors.items():
+        place = np.arange(len(shares)) + shift
+        axes.barh(place, shares[outcome], left=starts[outcome], color=color, label=outcome, **style)
 
 
 def faults(table: pd.DataFrame) -> Figure:
     """Draw what runs come to under each fault at three severities, one panel per controller."""
-    controllers = list(table["controller"].unique())
-    rows = table[["fault", "severity"]].drop_duplicates()
-    labels = [
-        f"{fault}: {severity}" if severity != "-" else "no fault" for fault, severity in rows.to_numpy()
-    ]
+    controllers = table["controller"].unique()
+    names = table["fault"].str.cat(table["severity"], sep=": ").replace("none: -", "no fault")
     figure, panels = new_figure(PAGE_WIDTH, 7.6, 1, len(controllers), sharey=True)
-    for axes, controller in zip(np.atleast_1d(panels), controllers):
-        chosen = table[table["controller"] == controller]
-        counts = (
-            chosen.groupby(["fault", "severity"])["outcome"]
-            .value_counts(normalize=True)
-            .unstack(fill_value=0)
-        )
-        counts = counts.reindex(pd.MultiIndex.from_frame(rows)).fillna(0)
-        left = np.zeros(len(rows))
-        for outcome, color in OUTCOME_COLORS.items():
-            width = 100 * counts.get(outcome, pd.Series(0.0, index=counts.index)).to_numpy()
-            axes.barh(np.arange(len(rows)), width, left=left, color=color, height=0.85, label=outcome)
-            left += width
+    for axes, controller in zip(panels, controllers):
+        chosen = table["controller"] == controller
+        stacked_shares(axes, names[chosen], table.loc[chosen, "outcome"], OUTCOME_COLORS, height=0.85)
         axes.set_xlim(0, 100)
         axes.grid(axis="y", visible=False)
         label_axes(axes, "runs [%]", title=controller)
-    first = np.atleast_1d(panels)[0]
-    first.set_yticks(range(len(rows)), labels)
-    first.set_ylim(len(rows) - 0.4, -0.6)
+    panels[0].set_yticks(range(names.nunique()), names.unique())
+    panels[0].set_ylim(names.nunique() - 0.4, -0.6)
     legend(figure)
     return figure

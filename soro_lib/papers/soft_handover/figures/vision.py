@@ -13,19 +13,10 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
-from numpy.typing import NDArray
 
-from soro_lib.papers.soft_handover.figures.handovers import COMMANDED
-from soro_lib.replication.plotting import (
-    COLORS,
-    ESTIMATE,
-    PAGE_WIDTH,
-    TRUTH,
-    equal_aspect,
-    label_axes,
-    legend,
-    new_figure,
-)
+from soro_lib.papers.soft_handover.figures.handovers import SHAPES, stacked_shares
+from soro_lib.papers.soft_handover.world.plant import Array
+from soro_lib.replication.plotting import COLORS, PAGE_WIDTH, equal_aspect, label_axes, legend, new_figure
 from soro_lib.robots.helix import origin_from_arm_base
 from soro_lib.sensing.camera import Image
 from soro_lib.sensing.handover_vision import Look
@@ -74,25 +65,31 @@ def plain_logarithm(axes: Any, name: str) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
+def show_picture(axes: Any, picture: Image, title: str = "") -> None:
+    """Draw a picture without axes."""
+    axes.imshow(picture[..., ::-1])
+    axes.set_axis_off()
+    label_axes(axes, title=title)
+
+
+def patch_legend(figure: Figure, colors: Mapping[str, str], title: str) -> None:
+    """Add a legend of filled colours below a figure."""
+    patches = [Patch(color=color) for color in colors.values()]
+    figure.legend(patches, list(colors), loc="outside lower center", ncols=len(colors), title=title)
+
+
 def fig04_detections(
-    images: Sequence[Image], cameras: Sequence[CalibratedCamera], look: Look, titles: Sequence[str] = ()
+    images: Sequence[Image], cameras: Sequence[CalibratedCamera], look: Look, titles: Sequence[str]
 ) -> Figure:
     """Draw the pictures of all cameras with what was found in them."""
     figure, panels = new_figure(PAGE_WIDTH, 2.5, 1, len(images))
-    for i, axes in enumerate(np.atleast_1d(panels)):
-        axes.imshow(annotated(images[i], cameras[i], look, i)[..., ::-1])
-        axes.set_axis_off()
-        if titles:
-            axes.set_title(titles[i])
+    for i, axes in enumerate(panels):
+        show_picture(axes, annotated(images[i], cameras[i], look, i), titles[i])
     return figure
 
 
 def close_ups(
-    images: Sequence[Image],
-    cameras: Sequence[CalibratedCamera],
-    look: Look,
-    ball: NDArray[np.float64],
-    half: int = 70,
+    images: Sequence[Image], cameras: Sequence[CalibratedCamera], look: Look, ball: Array, half: int = 70
 ) -> list[Image]:
     """Return what each camera shows around a true ball (3,) [m], the found circle drawn finely."""
     pictures = []
@@ -112,67 +109,60 @@ def fig15_occlusion(table: pd.DataFrame, pictures: Sequence[Image], hidden: floa
     """Draw the error of the ball against its visible share, beside the pictures of the worst case."""
     figure, (left, middle, right) = new_figure(PAGE_WIDTH, 2.9, 1, 3, width_ratios=(1, 1, 2.2))
     for axes, picture, name in zip((left, middle), pictures, ("worst case: left", "and right camera")):
-        axes.imshow(picture[..., ::-1])
-        axes.set_axis_off()
-        axes.set_title(name)
+        show_picture(axes, picture, name)
     for rule, group in table.groupby("rule", sort=False):
-        marker = "o" if rule == "largest piece" else "."
-        right.plot(
-            100 * group["visible"],
-            group["ball_mm"],
-            linestyle="none",
-            marker=marker,
-            markersize=4,
-            color=RULE_COLORS[str(rule)],
-            markerfacecolor="none" if rule == "largest piece" else RULE_COLORS[str(rule)],
-            label=str(rule),
-        )
+        color = RULE_COLORS[str(rule)]
+        style = {"linestyle": "none", "markersize": 4, "color": color, "label": str(rule)}
+        marker = {"marker": "o", "markerfacecolor": "none"} if rule == "largest piece" else {"marker": "."}
+        right.plot(100 * group["visible"], group["ball_mm"], **style, **marker)
     right.axvline(100 * hidden, color=COLORS["grey"], linewidth=0.8, linestyle=":")
     plain_logarithm(right, "y")
-    label_axes(
-        right,
-        "visible share of the ball, worse camera [%]",
-        "error of the ball [mm]",
-        title=f"{table['pose'].nunique()} balls",
-    )
+    x, y = "visible share of the ball, worse camera [%]", "error of the ball [mm]"
+    label_axes(right, x, y, title=f"{table['pose'].nunique()} balls")
     legend(right)
     return figure
 
 
-SEEN_BY = ("neither", "left only", "right only", "both")
+SEEN_BY = {
+    "neither": COLORS["light"],
+    "left only": "#f3d9a4",
+    "right only": "#b5d8ee",
+    "both": COLORS["green"],
+}
+"""Colours of places by the cameras that see them."""
 
 
 def fig14_workspace(table: pd.DataFrame) -> Figure:
     """Draw which cameras see ring and ball at every place of the gripper, in three planes."""
     depths = sorted(table["y_mm"].unique())
-    colors = (COLORS["light"], "#f3d9a4", "#b5d8ee", COLORS["green"])
+    colors = ListedColormap(list(SEEN_BY.values()))
     figure, panels = new_figure(PAGE_WIDTH, 2.35, 1, len(depths), sharey=True)
     for axes, depth in zip(panels, depths):
         plane = table[table["y_mm"] == depth]
         seen = plane["left"].astype(int) + 2 * plane["right"].astype(int)
         grid = plane.assign(seen=seen).pivot(index="z_mm", columns="x_mm", values="seen")
-        axes.pcolormesh(
-            grid.columns, grid.index, grid, cmap=ListedColormap(colors), vmin=0, vmax=3, rasterized=True
-        )
+        axes.pcolormesh(grid.columns, grid.index, grid, cmap=colors, vmin=0, vmax=3, rasterized=True)
         axes.plot([0], [700], marker="+", markersize=9, color=COLORS["black"])
         where = (
-            "in the arm's plane"
-            if depth == 0
-            else f"{abs(depth):.0f} mm {'nearer' if depth > 0 else 'farther'}"
+            f"{abs(depth):.0f} mm {'nearer' if depth > 0 else 'farther'}" if depth else "in the arm's plane"
         )
         label_axes(axes, "to the right [mm]", title=where)
         axes.set_aspect("equal")
         axes.grid(False)
     panels[0].invert_yaxis()
     panels[0].set_ylabel("below the base [mm]")
-    figure.legend(
-        [Patch(color=color) for color in colors],
-        SEEN_BY,
-        loc="outside lower center",
-        ncols=4,
-        title="seen by",
-    )
+    patch_legend(figure, SEEN_BY, "seen by")
     return figure
+
+
+SHIFTS = dict(zip(ESTIMATOR_COLORS, (-0.22, 0.0, 0.22)))
+"""Where each estimator stands beside the middle of its row."""
+
+
+def name_rows(axes: Any, names: Sequence[str]) -> None:
+    """Name the rows of a figure, the first at the top."""
+    axes.set_yticks(range(len(names)), names)
+    axes.invert_yaxis()
 
 
 def error_budget(budget: pd.DataFrame) -> Figure:
@@ -180,17 +170,16 @@ def error_budget(budget: pd.DataFrame) -> Figure:
     figure, (left, right) = new_figure(PAGE_WIDTH, 3.2, 1, 2, sharey=True)
     names = list(dict.fromkeys(budget["condition"]))
     for axes, what, unit in ((left, "gripper", "mm"), (right, "direction", "deg")):
-        for shift, (estimator, color) in zip((-0.22, 0.0, 0.22), ESTIMATOR_COLORS.items()):
+        for estimator, color in ESTIMATOR_COLORS.items():
             rows = budget[budget["estimator"] == estimator]
-            place = np.array([names.index(name) for name in rows["condition"]]) + shift
+            place = np.array([names.index(name) for name in rows["condition"]]) + SHIFTS[estimator]
             median, high = rows[f"{what}_median_{unit}"], rows[f"{what}_p95_{unit}"]
             axes.hlines(place, median, high, color=color, linewidth=2.0)
             axes.plot(median, place, "o", color=color, markersize=5, label=estimator)
             axes.plot(high, place, "|", color=color, markersize=8, markeredgewidth=2)
         plain_logarithm(axes, "x")
         label_axes(axes, f"error of the {what} [{unit}]")
-    left.set_yticks(range(len(names)), names)
-    left.invert_yaxis()
+    name_rows(left, names)
     left.set_title("dot: median, bar: 95th percentile")
     legend(figure)
     return figure
@@ -200,22 +189,19 @@ def degradations(table: pd.DataFrame) -> Figure:
     """Draw how often arm and ball are found in bad pictures, and how far off the gripper is."""
     names = list(dict.fromkeys(table["degradation"]))
     figure, (left, right) = new_figure(PAGE_WIDTH, 3.4, 1, 2, sharey=True)
-    groups = table.groupby(["estimator", "degradation"], sort=False)
-    for shift, (estimator, color) in zip((-0.22, 0.0, 0.22), ESTIMATOR_COLORS.items()):
-        error = groups["gripper_mm"]
-        place = np.arange(len(names)) + shift
-        median = [error.get_group((estimator, name)).median() for name in names]
-        high = [error.get_group((estimator, name)).quantile(0.95) for name in names]
+    errors = table.groupby(["estimator", "degradation"])["gripper_mm"]
+    for estimator, color in ESTIMATOR_COLORS.items():
+        median, high = (errors.quantile(q)[estimator][names] for q in (0.5, 0.95))
+        place = np.arange(len(names)) + SHIFTS[estimator]
         left.hlines(place, median, high, color=color, linewidth=2.0)
         left.plot(median, place, "o", color=color, markersize=4, label=estimator)
     thesis = table[table["estimator"] == "thesis"].groupby("degradation", sort=False)
-    for shift, column, color in ((-0.17, "gripper_mm", COLORS["black"]), (0.17, "ball_mm", COLORS["green"])):
-        share = 100 * thesis[column].apply(lambda errors: errors.notna().mean())
-        what = "arm found" if column == "gripper_mm" else "ball found"
-        right.barh(np.arange(len(names)) + shift, share[names], 0.32, color=color, label=what)
+    for shift, what, color in ((-0.17, "gripper_mm", COLORS["black"]), (0.17, "ball_mm", COLORS["green"])):
+        share = 100 * thesis[what].count() / thesis.size()
+        label = "arm found" if what == "gripper_mm" else "ball found"
+        right.barh(np.arange(len(names)) + shift, share[names], 0.32, color=color, label=label)
     plain_logarithm(left, "x")
-    left.set_yticks(range(len(names)), names)
-    left.invert_yaxis()
+    name_rows(left, names)
     label_axes(left, "error of the gripper [mm]", title="median to 95th percentile")
     label_axes(right, "share of the looks [%]", title="found at all")
     legend(figure)
@@ -227,38 +213,16 @@ VERDICT_COLORS = {"located": COLORS["green"], "refused": COLORS["sky"], "wrong":
 
 def image_faults(table: pd.DataFrame, estimators: Sequence[str] = ("thesis", "joint")) -> Figure:
     """Draw what becomes of arm and ball under every fault of the pictures."""
-    names = list(dict.fromkeys(table["fault"]))
     figure, panels = new_figure(PAGE_WIDTH, 3.4, 1, 2, sharey=True)
     for axes, what in zip(panels, ("gripper", "ball")):
-        for shift, estimator in zip((-0.2, 0.2), estimators):
+        for shift, opacity, estimator in zip((-0.2, 0.2), (0.55, 1.0), estimators):
             rows = table[table["estimator"] == estimator]
-            shares = pd.crosstab(rows["fault"], rows[what], normalize="index").reindex(
-                index=names, columns=list(VERDICT_COLORS), fill_value=0.0
-            )
-            start = np.zeros(len(names))
-            for verdict, color in VERDICT_COLORS.items():
-                share = 100 * shares[verdict].to_numpy()
-                axes.barh(
-                    np.arange(len(names)) + shift,
-                    share,
-                    0.34,
-                    left=start,
-                    color=color,
-                    alpha=0.55 if estimator == "thesis" else 1.0,
-                )
-                start += share
+            style = {"shift": shift, "height": 0.34, "alpha": opacity}
+            stacked_shares(axes, rows["fault"], rows[what], VERDICT_COLORS, **style)
         label_axes(axes, "share of the looks [%]", title=what)
         axes.grid(False)
-    panels[0].set_yticks(range(len(names)), names)
-    panels[0].invert_yaxis()
-    handles = [Patch(color=color) for color in VERDICT_COLORS.values()]
-    figure.legend(
-        handles,
-        list(VERDICT_COLORS),
-        loc="outside lower center",
-        ncols=3,
-        title=f"pale: {estimators[0]}, full: {estimators[1]}",
-    )
+    name_rows(panels[0], list(table["fault"].unique()))
+    patch_legend(figure, VERDICT_COLORS, f"pale: {estimators[0]}, full: {estimators[1]}")
     return figure
 
 
@@ -274,14 +238,8 @@ def rendered_handovers(runs: pd.DataFrame) -> Figure:
             place = np.arange(len(names)) + shift
             low, middle, high = (values.quantile(q)[names] for q in (0.0, 0.5, 1.0))
             axes.vlines(place, low, high, color=ESTIMATOR_COLORS[estimator], linewidth=1.4)
-            axes.plot(
-                place,
-                middle,
-                PLANT_MARKERS[plant],
-                color=ESTIMATOR_COLORS[estimator],
-                markersize=4.5,
-                label=f"plant {plant}, {estimator}",
-            )
+            style = {"color": ESTIMATOR_COLORS[estimator], "markersize": 4.5}
+            axes.plot(place, middle, PLANT_MARKERS[plant], **style, label=f"plant {plant}, {estimator}")
         axes.set_xticks(range(len(names)), [name.replace("thesis, step ", "") for name in names])
     plain_logarithm(left, "y")
     label_axes(left, "step size of the thesis's controller, or best", "steps to the closed gripper")
@@ -317,16 +275,7 @@ def comparison_with_noise_model(rendered: pd.DataFrame, modelled: Mapping[str, p
     return figure
 
 
-SHAPE_STYLES = {"true": TRUTH, "commanded": COMMANDED, "estimated": ESTIMATE}
-"""The arm's shapes."""
-
-
-def explorer_view(
-    pictures: Sequence[Image],
-    shapes: Mapping[str, NDArray[np.float64]],
-    ball: NDArray[np.float64],
-    status: str,
-) -> Figure:
+def explorer_view(pictures: Sequence[Image], shapes: Mapping[str, Array], ball: Array, status: str) -> Figure:
     """Draw what the explorer shows: both pictures, and the shapes of the arm beside the ball.
 
     Parameters
@@ -342,9 +291,7 @@ def explorer_view(
     """
     figure, panels = new_figure(PAGE_WIDTH, 4.2, 2, 2, width_ratios=(1.25, 1))
     for axes, picture, name in zip(panels[:, 0], pictures, ("left camera", "right camera")):
-        axes.imshow(picture[..., ::-1])
-        axes.set_axis_off()
-        axes.set_title(name)
+        show_picture(axes, picture, name)
     grid = panels[0, 1].get_gridspec()
     for axes in panels[:, 1]:
         axes.remove()
@@ -352,12 +299,12 @@ def explorer_view(
     drawn = [1e3 * origin_from_arm_base(ball[None])]
     for name, points in shapes.items():
         drawn.append(1e3 * origin_from_arm_base(points))
-        style = {key: value for key, value in SHAPE_STYLES[name].items() if key != "zorder"}
+        style = {key: value for key, value in SHAPES[name].items() if key != "zorder"}
         space.plot(*drawn[-1].T, **style, label=name)
     space.plot(*drawn[0].T, "o", color=COLORS["green"], markersize=8, label="ball")
     equal_aspect(space, np.concatenate(drawn))
-    space.xaxis.set_major_locator(MultipleLocator(100))
-    space.yaxis.set_major_locator(MultipleLocator(100))
+    for axis in (space.xaxis, space.yaxis):
+        axis.set_major_locator(MultipleLocator(100))
     label_axes(space, "x [mm]", "y [mm]", "z [mm]", status)
     space.zaxis.labelpad = 10
     legend(figure)

@@ -1,1 +1,2 @@
-"""The simulated arm, the room, and what the cameras see of them."""
+"""What the thesis had in hardware: the sagging arm (``plant``), room and pictures (``scene``), and the eyes
+(``observer``); no controller and no experiment."""

@@ -12,16 +12,11 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
-from soro_lib.papers.soft_handover.world.scene import (
-    STEREO,
-    WEBCAM,
-    Extras,
-    HandoverScene,
-    Viewpoint,
-    photograph,
-)
+from soro_lib.checks import not_negative, positive
+from soro_lib.papers.soft_handover.world.plant import Array
+from soro_lib.papers.soft_handover.world.scene import STEREO, WEBCAM, Extras, HandoverScene, photographs
 from soro_lib.poses import magnitude
 from soro_lib.project import data_directory
 from soro_lib.robots.helix import HelixArm
@@ -30,21 +25,16 @@ from soro_lib.sensing.camera import Image
 from soro_lib.sensing.handover_observation import HandoverObservation
 from soro_lib.sensing.handover_vision import HandoverVision, Look
 from soro_lib.sensing.stereo_vision import CalibratedCamera, box_corners, calibrate
-from soro_lib.worlds.rendering import Photometry
 
 
 class Observer(Protocol):
     """What the handover loop sees through."""
 
-    def observe(
-        self, state: NDArray[np.float64], ball: NDArray[np.float64], rng: np.random.Generator
-    ) -> HandoverObservation:
+    def observe(self, state: Array, ball: Array, rng: Generator) -> HandoverObservation:
         """Return what is seen of the true state q (9,) and the true ball (3,) [m]."""
-        ...
 
     def reset(self) -> None:
         """Forget earlier looks."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -78,15 +68,8 @@ class VisionNoise:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not (np.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} must be finite and at least 0, got {value}")
-        if self.bias_length == 0:
-            raise ValueError("bias_length must be positive")
-
-    def scaled(self, factor: float) -> "VisionNoise":
-        """Return the same budget with all standard deviations multiplied."""
-        lengths = ("bias_length", "occlusion_distance")
-        return VisionNoise(**{k: v if k in lengths else factor * v for k, v in vars(self).items()})
+            not_negative(name, value)
+        positive("bias_length", self.bias_length)
 
 
 NO_NOISE = VisionNoise(0, 0, 0, 0, 0, 0)
@@ -126,12 +109,10 @@ class NoisyObserver:
 
     def reset(self) -> None:
         """Draw new pose-dependent errors at the next look."""
-        self._bias: NDArray[np.float64] | None = None
+        self._bias: Array | None = None
         self._wrist = np.zeros(3)
 
-    def observe(
-        self, state: NDArray[np.float64], ball: NDArray[np.float64], rng: np.random.Generator
-    ) -> HandoverObservation:
+    def observe(self, state: Array, ball: Array, rng: Generator) -> HandoverObservation:
         """Return what is seen of the true state q (9,) and the true ball (3,) [m]."""
         points = tip_points(state, self.arm.gripper_length)
         wrist = points[:3]
@@ -151,9 +132,7 @@ class NoisyObserver:
             ball_deviation=float(np.hypot(ball_deviation, noise.ball_bias)),
         )
 
-    def _pose_dependent_error(
-        self, wrist: NDArray[np.float64], rng: np.random.Generator
-    ) -> NDArray[np.float64]:
+    def _pose_dependent_error(self, wrist: Array, rng: Generator) -> Array:
         """Return unit normal errors (3, 3) of wrist, direction and ball that change as the wrist moves.
 
         The ball's own does not change: it hangs on the calibration and on where the ball is.
@@ -180,10 +159,9 @@ class RenderedObserver:
     ----------
     vision : HandoverVision
         Whose cameras are where they are believed to be, up to calibration.
-    views : sequence of Viewpoint
+    views : sequence of CalibratedCamera
         Where the cameras truly are.
     scene : HandoverScene
-    photometry : Photometry
     extras : Extras
         What else is in the pictures.
     spoil : callable, optional
@@ -198,9 +176,8 @@ class RenderedObserver:
     """
 
     vision: HandoverVision
-    views: Sequence[Viewpoint] = STEREO
+    views: Sequence[CalibratedCamera] = STEREO
     scene: HandoverScene = field(default_factory=HandoverScene)
-    photometry: Photometry = WEBCAM
     extras: Extras = field(default_factory=Extras)
     spoil: Spoil | None = None
 
@@ -214,26 +191,24 @@ class RenderedObserver:
         self.look: Look | None = None
         self._number = -1
 
-    def observe(
-        self, state: NDArray[np.float64], ball: NDArray[np.float64], rng: np.random.Generator
-    ) -> HandoverObservation:
+    def observe(self, state: Array, ball: Array, rng: Generator) -> HandoverObservation:
         """Return what is seen of the true state q (9,) and the true ball (3,) [m]."""
         self._number += 1
         items = self.scene.items(state, ball, self.extras)
-        self.images = [photograph(items, view, self.photometry, rng) for view in self.views]
+        self.images = photographs(items, self.views, WEBCAM, rng)
         shown = self.images if self.spoil is None else self.spoil(self._number, self.images)
         self.look = self.vision.look(shown)
         return self.look.observation
 
 
 def calibrate_on_box(
-    views: Sequence[Viewpoint], rng: np.random.Generator, selection_deviation: float = 0.5
+    views: Sequence[CalibratedCamera], rng: Generator, selection_deviation: float = 0.5
 ) -> list[CalibratedCamera]:
     """Return the cameras as a calibration on the box finds them, its corners selected by hand.
 
     Parameters
     ----------
-    views : sequence of Viewpoint
+    views : sequence of CalibratedCamera
         The true cameras.
     rng : numpy.random.Generator
     selection_deviation : float
@@ -242,7 +217,7 @@ def calibrate_on_box(
     corners = box_corners()
     cameras = []
     for view in views:
-        truth = CalibratedCamera(view.camera, view.pose).project(corners)
+        truth = view.project(corners)
         selected = truth + selection_deviation * rng.standard_normal(truth.shape)
         cameras.append(calibrate(view.camera, corners, selected))
     return cameras

@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import not_negative, positive
 from soro_lib.robots.helix import HelixArm
 from soro_lib.robots.helix_kernels import (
     cholesky,
@@ -50,7 +51,7 @@ ENERGY_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
-class Hand:
+class HoldingHand:
     """A hand that holds wrist and gripper like a spring each.
 
     Attributes
@@ -68,17 +69,14 @@ class Hand:
 class HelixPlant(Protocol):
     """What a simulated arm offers to a study."""
 
-    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> Array:
+    def settle(self, tendon_lengths: ArrayLike, hand: HoldingHand | None = None) -> Array:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m]."""
-        ...
 
     def carry(self, mass: float) -> None:
         """Hang a mass [kg] into the gripper."""
-        ...
 
     def reset(self) -> None:
         """Forget where the arm is and what it carries."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -97,16 +95,14 @@ class Stiffness:
     axial: float = 80.0
 
     def __post_init__(self) -> None:
-        for name in ("bending", "axial"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        positive("bending", self.bending)
+        positive("axial", self.axial)
 
     def diagonal(self, arm: HelixArm) -> Array:
         """Return the stiffness of each coordinate of q (9,): Nm/rad for angles, N/m for lengths."""
         lengths = np.asarray(arm.rest_lengths)
-        return np.stack(
-            [self.bending / lengths, self.bending / lengths, self.axial / lengths], axis=-1
-        ).ravel()
+        bending = self.bending / lengths
+        return np.stack([bending, bending, self.axial / lengths], axis=-1).ravel()
 
 
 @dataclass
@@ -121,50 +117,35 @@ class AngleLossPlant:
     realised : tuple of 3 float
         Share of the bending angle that segments 1 to 3 realise, in (0, 1].
     arm : HelixArm
-    play : float
-        Half width of the backlash of each bending angle [rad].
     stiffness : Stiffness
         Against the pull of a hand.
     """
 
     realised: tuple[float, float, float]
     arm: HelixArm = field(default_factory=HelixArm)
-    play: float = 0.0
     stiffness: Stiffness = field(default_factory=Stiffness)
 
     def __post_init__(self) -> None:
         if len(self.realised) != 3 or not all(0 < share <= 1 for share in self.realised):
             raise ValueError(f"realised must be three shares in (0, 1], got {self.realised}")
-        if not self.play >= 0:
-            raise ValueError(f"play must be at least 0 rad, got {self.play}")
         self._shares = np.stack([self.realised, self.realised, np.ones(3)], axis=-1).ravel()
-        self.reset()
 
     def reset(self) -> None:
-        """Put the arm back to its calibrated state."""
-        self._free = self.arm.home.copy()
+        """Forget nothing: this plant has no memory."""
 
     def carry(self, mass: float) -> None:
         """Take a mass [kg] without any effect: this plant knows no weight."""
 
-    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> Array:
+    def settle(self, tendon_lengths: ArrayLike, hand: HoldingHand | None = None) -> Array:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m].
 
-        Without play the state depends on the command alone. A hand moves it to the least energy of arm and
-        grip.
+        A hand moves it to the least energy of arm and grip.
         """
-        target = self._shares * self.arm.state_from_tendons(tendon_lengths)
-        slack = self.play * (self._shares < 1)
-        self._free = np.clip(self._free, target - slack, target + slack)
+        free = self._shares * self.arm.state_from_tendons(tendon_lengths)
         if hand is None:
-            return self._free.copy()
-        return held_state(
-            self._free,
-            self.stiffness.diagonal(self.arm),
-            hand.points,
-            hand.stiffness,
-            self.arm.gripper_length,
-        )
+            return free
+        stiffness = self.stiffness.diagonal(self.arm)
+        return held_state(free, stiffness, hand.points, hand.stiffness, self.arm.gripper_length)
 
 
 @njit(cache=True)
@@ -172,16 +153,11 @@ def held_state(free: Array, stiffness: Array, held: Array, grip: float, gripper_
     """Return the state of least ``(q - free)' K (q - free) + grip |f(q) - held|^2``, by Gauss-Newton."""
     q = free.copy()
     for _ in range(50):
-        gradient, hessian = np.empty(9), np.zeros((9, 9))
-        for i in range(9):
-            gradient[i] = stiffness[i] * (q[i] - free[i])
-            hessian[i, i] = stiffness[i]
+        gradient, hessian = stiffness * (q - free), np.diag(stiffness)
         add_grip(gradient, hessian, q, held, grip, gripper_length)
         step = cholesky_solve(cholesky(hessian), gradient)
         longest = largest(step)
-        share = min(1.0, LONGEST_NEWTON_STEP / longest)
-        for i in range(9):
-            q[i] -= share * step[i]
+        q -= min(1.0, LONGEST_NEWTON_STEP / longest) * step
         if longest < EQUILIBRIUM_TOLERANCE:
             break
     return q
@@ -193,14 +169,8 @@ def add_grip(
 ) -> None:
     """Add the slopes of ``grip |f(q) - held|^2 / 2`` to a gradient (9,) and a Hessian (9, 9), in place."""
     points, jacobian = tip_points_and_jacobian(q, gripper_length)
-    for k in range(6):
-        points[k] -= held[k]
-    pull = multiply(jacobian.T, points)
-    curvature = outer_gram(jacobian.T)
-    for i in range(9):
-        gradient[i] += grip * pull[i]
-        for j in range(9):
-            hessian[i, j] += grip * curvature[i, j]
+    gradient += grip * multiply(jacobian.T, points - held)
+    hessian += grip * outer_gram(jacobian.T)
 
 
 @dataclass
@@ -225,8 +195,6 @@ class ElasticPlant:
         Mass of the arm [kg/m].
     gripper_mass, gripper_mass_distance : float
         Gripper as a lump [kg] past the wrist [m].
-    play : float
-        Half width of the backlash of each tendon [m].
     """
 
     arm: HelixArm = field(default_factory=HelixArm)
@@ -236,29 +204,25 @@ class ElasticPlant:
     linear_density: float = 0.35
     gripper_mass: float = 0.25
     gripper_mass_distance: float = 0.05
-    play: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("tendon_stiffness", "free_length", "linear_density"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        for name in ("gripper_mass", "gripper_mass_distance", "play"):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"{name} must be at least 0, got {getattr(self, name)}")
+            positive(name, getattr(self, name))
+        for name in ("gripper_mass", "gripper_mass_distance"):
+            not_negative(name, getattr(self, name))
         self._tendon_map = np.ascontiguousarray(self.arm.tendon_lengths(np.eye(9)).T)
         self.reset()
 
     def reset(self) -> None:
         """Start the next search from the calibrated state."""
         self._state = self.arm.home.copy()
-        self._realised = self.arm.tendon_lengths(self.arm.home)
         self._payload = 0.0
 
     def carry(self, mass: float) -> None:
         """Hang a mass [kg] into the gripper, where its own mass is."""
         self._payload = mass
 
-    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> Array:
+    def settle(self, tendon_lengths: ArrayLike, hand: HoldingHand | None = None) -> Array:
         """Return the true state q (9,) at rest under the commanded tendon lengths (9,) [m].
 
         The search starts from the last state, as the arm does.
@@ -268,11 +232,9 @@ class ElasticPlant:
         RuntimeError
             If the search for the equilibrium does not come to rest.
         """
-        command = np.asarray(tendon_lengths, dtype=float)
-        self._realised = np.clip(self._realised, command - self.play, command + self.play)
         lengths = np.asarray(self.arm.rest_lengths)
         arm = LoadedArm(
-            tendons=self._realised,
+            tendons=np.asarray(tendon_lengths, dtype=float),
             tendon_map=self._tendon_map,
             tendon_stiffness=self.tendon_stiffness,
             stiffness=self.stiffness.diagonal(self.arm),
@@ -432,9 +394,8 @@ class LaggingPlant:
     time_constant: float
 
     def __post_init__(self) -> None:
-        for name in ("timestep", "time_constant"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        positive("timestep", self.timestep)
+        positive("time_constant", self.time_constant)
         self._state: Array | None = None
 
     def reset(self) -> None:
@@ -446,7 +407,7 @@ class LaggingPlant:
         """Hang a mass [kg] into the gripper."""
         self.plant.carry(mass)
 
-    def settle(self, tendon_lengths: ArrayLike, hand: Hand | None = None) -> Array:
+    def settle(self, tendon_lengths: ArrayLike, hand: HoldingHand | None = None) -> Array:
         """Return the true state q (9,) one timestep later."""
         rest = self.plant.settle(tendon_lengths, hand)
         left = np.exp(-self.timestep / self.time_constant)
@@ -472,9 +433,8 @@ class Gripper:
     reach: float = 0.040
 
     def __post_init__(self) -> None:
-        for name in ("opening", "reach"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        positive("opening", self.opening)
+        positive("reach", self.reach)
 
     def holds(self, points: ArrayLike, ball: ArrayLike) -> bool:
         """Return whether closing at the true wrist and gripper (6,) catches a ball centred at `ball` (3,)

@@ -16,12 +16,15 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.random import Generator
+from numpy.typing import ArrayLike
 
 from soro_lib.arcs import backbone, chain_transform
+from soro_lib.papers.soft_handover.world.plant import Array
 from soro_lib.robots.helix import HelixArm
 from soro_lib.sensing.camera import Camera, Image, look_at, transform_points
 from soro_lib.sensing.marker_ring import MarkerRing
+from soro_lib.sensing.stereo_vision import CalibratedCamera
 from soro_lib.worlds.rendering import Drawable, Photometry, Polygon, TexturedQuad, motion_kernel, render
 from soro_lib.worlds.round_bodies import Ball, Color, Tube
 
@@ -38,54 +41,41 @@ SLEEVE: Color = (120, 70, 60)
 BALL: Color = (60, 175, 50)
 DULL_GREEN: Color = (88, 118, 92)
 
+Span = tuple[float, float]
 
-@dataclass(frozen=True, eq=False)
-class Viewpoint:
-    """A camera and where it stands.
-
-    Attributes
-    ----------
-    camera : Camera
-        Intrinsic parameters.
-    pose : ndarray, shape (4, 4)
-        ``camera_in_world``, frame `arm_base`.
-    """
-
-    camera: Camera
-    pose: NDArray[np.float64]
-
-    @classmethod
-    def aimed(cls, position: ArrayLike, target: ArrayLike, camera: Camera = BRIO) -> "Viewpoint":
-        """Return an upright camera at ``position`` aimed at ``target``, both (3,) [m] in `arm_base`."""
-        return cls(camera, look_at(position, target, UP))
+BALL_RADIUS = 0.020
+"""Radius of the green ball [m]."""
 
 
-def stereo_pair(
-    baseline: float = 0.5, distance: float = 0.75, toe_in: float = 0.5, camera: Camera = BRIO
-) -> tuple[Viewpoint, Viewpoint]:
+def aimed(position: ArrayLike, target: ArrayLike, camera: Camera = BRIO) -> CalibratedCamera:
+    """Return an upright camera at ``position`` aimed at ``target``, both (3,) [m] in `arm_base`."""
+    return CalibratedCamera(camera, look_at(position, target, UP))
+
+
+BASELINE, DISTANCE, HEIGHT = 0.5, 0.75, 0.62
+"""Of the cameras from each other, which the thesis prints, from the hanging arm and below its base [m]."""
+
+
+def stereo_pair(toe_in: float = 0.5, camera: Camera = BRIO) -> tuple[CalibratedCamera, CalibratedCamera]:
     """Return the left and the right camera, as seen from behind them.
 
     Parameters
     ----------
-    baseline : float
-        Distance of the cameras from each other [m]; the thesis prints about 0.5.
-    distance : float
-        From the hanging arm, along y [m].
     toe_in : float
         0 for parallel cameras, 1 for cameras aimed at the hanging arm.
     camera : Camera
     """
-    height = 0.62
-    return tuple(  # type: ignore[return-value]
-        Viewpoint.aimed((x, distance, height), ((1 - toe_in) * x, 0.0, height), camera)
-        for x in (-baseline / 2, baseline / 2)
+    left, right = (
+        aimed((x, DISTANCE, HEIGHT), ((1 - toe_in) * x, 0.0, HEIGHT), camera)
+        for x in (-BASELINE / 2, BASELINE / 2)
     )
+    return left, right
 
 
 STEREO = stereo_pair()
 """The cameras of the replication, half toed in, so that both see where the thesis's four locations are."""
 
-SIDE_CAMERA = Viewpoint.aimed((0.80, -0.05, 0.62), (0.0, -0.05, 0.62))
+SIDE_CAMERA = aimed((0.80, -0.05, HEIGHT), (0.0, -0.05, HEIGHT))
 """A third camera, which looks at the arm from the right."""
 
 
@@ -101,18 +91,11 @@ class Extras:
         Ids of markers that a cloth covers.
     second_ball : (float, float, float), optional
         Centre of another green ball [m].
-    grip : float
-        0 for an open gripper, 1 for a closed one.
     """
 
     hand: bool = True
     hidden_markers: frozenset[int] = frozenset()
     second_ball: tuple[float, float, float] | None = None
-    grip: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.grip <= 1:
-            raise ValueError(f"Extras.grip must be in [0, 1], got {self.grip}")
 
 
 @dataclass(frozen=True)
@@ -123,13 +106,10 @@ class HandoverScene:
     ----------
     arm : HelixArm
     ring : MarkerRing
-    ball_radius : float
-        Radius of the green ball [m].
     """
 
     arm: HelixArm = field(default_factory=HelixArm)
     ring: MarkerRing = field(default_factory=MarkerRing)
-    ball_radius: float = 0.020
 
     def items(self, state: ArrayLike, ball: ArrayLike, extras: Extras | None = None) -> list[Drawable]:
         """Return everything to draw for a true state q (9,) and a true ball (3,) [m].
@@ -144,23 +124,18 @@ class HandoverScene:
         if ball.shape != (3,) or not np.isfinite(ball).all():
             raise ValueError(f"ball must be three finite numbers [m], got {ball}")
         wrist = self.wrist(state)
-        items: list[Drawable] = [*self._arm(np.asarray(state, dtype=float)), *self._ring(wrist, extras)]
-        items += self._gripper(wrist, extras.grip)
-        items.append(self.ball(ball))
-        if extras.hand:
-            items += self._hand(ball)
-        if extras.second_ball is not None:
-            items.append(self.ball(np.array(extras.second_ball)))
-        return items
+        items = [*self._arm(np.asarray(state, dtype=float)), *self._ring(wrist, extras.hidden_markers)]
+        items += [*self._gripper(wrist), self.ball(ball), *(self._hand(ball) if extras.hand else [])]
+        return items if extras.second_ball is None else [*items, self.ball(np.array(extras.second_ball))]
 
-    def wrist(self, state: ArrayLike) -> NDArray[np.float64]:
+    def wrist(self, state: ArrayLike) -> Array:
         """Return ``wrist_in_world`` (4, 4) for a true state q (9,), which no actuator limits."""
         q = np.asarray(state, dtype=float)
         if q.shape != (9,):
             raise ValueError(f"state must be nine numbers, got shape {q.shape}")
         return chain_transform(q.reshape(3, 3))
 
-    def _arm(self, state: NDArray[np.float64]) -> list[Drawable]:
+    def _arm(self, state: Array) -> list[Drawable]:
         """Return two tubes per segment, their slices alternating like the helicoid's."""
         slices = 8
         points = backbone(state.reshape(3, 3), 2 * slices)
@@ -170,47 +145,43 @@ class HandoverScene:
             for i in range(0, len(points) - 1, slices)
         ]
 
-    def _ring(self, wrist: NDArray[np.float64], extras: Extras) -> list[Drawable]:
-        facets: list[Drawable] = []
-        for number, corners in enumerate(self.ring.facets):
-            covered = number in extras.hidden_markers
-            picture = CLOTH if covered else self.ring.prints[number]
-            facets.append(TexturedQuad(transform_points(wrist, corners), picture, supersampling=3))
-        return facets
+    def _ring(self, wrist: Array, hidden: frozenset[int]) -> list[Drawable]:
+        pictures = [CLOTH if i in hidden else picture for i, picture in enumerate(self.ring.prints)]
+        return [
+            TexturedQuad(transform_points(wrist, corners), picture, supersampling=3)
+            for corners, picture in zip(self.ring.facets, pictures)
+        ]
 
-    def _gripper(self, wrist: NDArray[np.float64], grip: float) -> list[Drawable]:
-        """Return the palm and three fingers, whose tips close toward the gripper point."""
-        below = self.ring.height / 2
+    def _gripper(self, wrist: Array) -> list[Drawable]:
+        """Return the palm and three open fingers."""
         length = self.arm.gripper_length
-        palm = np.array([(0, 0, below), (0, 0, 0.42 * length)])
+        palm = np.array([(0, 0, self.ring.height / 2), (0, 0, 0.42 * length)])
         parts: list[Drawable] = [Tube(transform_points(wrist, palm), 0.024, (PLASTIC,))]
         along = np.array([0.38, 0.6, 0.82, 1.05]) * length
-        outward = np.array([0.022, 0.040, 0.042, 0.034]) * (1 - 0.42 * grip * np.array([0, 0.6, 1, 1]))
+        outward = np.array([0.022, 0.040, 0.042, 0.034])
         for angle in 2 * np.pi * np.arange(3) / 3:
             finger = np.column_stack([outward * np.cos(angle), outward * np.sin(angle), along])
             parts.append(Tube(transform_points(wrist, finger), 0.007, (PLASTIC,)))
         return parts
 
-    def ball(self, centre: NDArray[np.float64]) -> Ball:
+    def ball(self, centre: Array) -> Ball:
         """Return the green ball with its middle at a point (3,) [m]."""
-        return Ball(centre, self.ball_radius, BALL, to_light=(0.3, 0.5, -1.0), ambient=0.55, supersampling=2)
+        return Ball(centre, BALL_RADIUS, BALL, to_light=(0.3, 0.5, -1.0), ambient=0.55, supersampling=2)
 
-    def _hand(self, ball: NDArray[np.float64]) -> list[Drawable]:
+    def _hand(self, ball: Array) -> list[Drawable]:
         """Return a palm under the ball, fingers and a forearm that comes from outside and below."""
         away = np.append(ball[:2], 0.0)
         norm = np.linalg.norm(away)
         away = away / norm if norm > 1e-6 else np.array([1.0, 0.0, 0.0])
         sideways = np.cross(away, UP)
         down = -np.array(UP)
-        palm = ball + (self.ball_radius + 0.014) * down
+        palm = ball + (BALL_RADIUS + 0.014) * down
         wrist = palm + 0.075 * away + 0.012 * down
+        hand = np.array([palm - 0.03 * away, palm, palm + 0.045 * away, wrist])
+        forearm = np.array([wrist, wrist + 0.10 * away + 0.03 * down])
         parts: list[Drawable] = [
-            Tube(
-                np.array([palm - 0.03 * away, palm, palm + 0.045 * away, wrist]),
-                np.array([0.011, 0.013, 0.014, 0.022]),
-                (SKIN,),
-            ),
-            Tube(np.array([wrist, wrist + 0.10 * away + 0.03 * down]), np.array([0.024, 0.03]), (SKIN,)),
+            Tube(hand, np.array([0.011, 0.013, 0.014, 0.022]), (SKIN,)),
+            Tube(forearm, np.array([0.024, 0.03]), (SKIN,)),
         ]
         elbow, shoulder = wrist + 0.08 * away + 0.025 * down, wrist + 0.28 * away + 0.55 * down
         sleeve = np.linspace(elbow, shoulder, 7)
@@ -233,26 +204,19 @@ def _room(camera: Camera, pose: bytes) -> Image:
     def wall(corners: ArrayLike, color: Color, layer: int) -> Polygon:
         return Polygon(np.array(corners, dtype=float), color, layer)
 
+    def upright(width: Span, y: float, height: Span, color: Color, layer: int) -> Polygon:
+        (left, right), (top, bottom) = width, height
+        return wall([(left, y, top), (right, y, top), (right, y, bottom), (left, y, bottom)], color, layer)
+
+    bench = [(-1.9, -1.4, 0.85), (1.0, -1.4, 0.85), (1.0, -0.9, 0.95), (-1.9, -0.9, 0.95)]
     items: list[Drawable] = [
-        wall([(-4, -2, -2), (4, -2, -2), (4, -2, 1.3), (-4, -2, 1.3)], (188, 196, 200), -9),
+        upright((-4, 4), -2, (-2, 1.3), (188, 196, 200), -9),
         wall([(-4, -2, 1.3), (4, -2, 1.3), (4, 3, 1.3), (-4, 3, 1.3)], (110, 122, 135), -8),
         wall([(-4, 3, -2), (-4, -2, -2), (-4, -2, 1.3), (-4, 3, 1.3)], (170, 178, 184), -8),
-        wall(
-            [(-1.1, -1.99, 0.05), (-0.3, -1.99, 0.05), (-0.3, -1.99, 0.6), (-1.1, -1.99, 0.6)],
-            (150, 105, 70),
-            -7,
-        ),
-        wall([(0.5, -1.9, 0.15), (1.5, -1.9, 0.15), (1.5, -1.9, 1.3), (0.5, -1.9, 1.3)], (96, 108, 128), -7),
-        wall(
-            [(0.55, -1.89, 0.25), (1.45, -1.89, 0.25), (1.45, -1.89, 0.5), (0.55, -1.89, 0.5)],
-            (60, 62, 70),
-            -6,
-        ),
-        wall(
-            [(-1.9, -1.4, 0.85), (1.0, -1.4, 0.85), (1.0, -0.9, 0.95), (-1.9, -0.9, 0.95)],
-            (135, 160, 182),
-            -5,
-        ),
+        upright((-1.1, -0.3), -1.99, (0.05, 0.6), (150, 105, 70), -7),
+        upright((0.5, 1.5), -1.9, (0.15, 1.3), (96, 108, 128), -7),
+        upright((0.55, 1.45), -1.89, (0.25, 0.5), (60, 62, 70), -6),
+        wall(bench, (135, 160, 182), -5),
     ]
     for x, z in ((-0.75, 0.62), (-0.62, 0.72), (-0.84, 0.76)):
         items.append(Ball(np.array([x, -1.2, z]), 0.11, DULL_GREEN, UP, 0.4, layer=-4))
@@ -280,7 +244,7 @@ NOISE_MARGIN = 160
 
 
 def photograph(
-    items: Sequence[Drawable], view: Viewpoint, photometry: Photometry, rng: np.random.Generator
+    items: Sequence[Drawable], view: CalibratedCamera, photometry: Photometry, rng: Generator
 ) -> Image:
     """Return the picture (height, width, 3), blue, green, red, that a camera takes of things in the room.
 
@@ -288,7 +252,7 @@ def photograph(
     ----------
     items : sequence of Drawable
         Of :meth:`HandoverScene.items`.
-    view : Viewpoint
+    view : CalibratedCamera
         The camera.
     photometry : Photometry
         Gain, blur, motion and read noise. The noise here does not depend on the signal (shot_noise is not
@@ -310,6 +274,13 @@ def photograph(
         more, less = _sensor_noise(photometry.read_noise, height, width)
         cv2.subtract(cv2.add(image, more[window], image), less[window], image)
     return np.asarray(image, dtype=np.uint8)
+
+
+def photographs(
+    items: Sequence[Drawable], views: Sequence[CalibratedCamera], photometry: Photometry, rng: Generator
+) -> list[Image]:
+    """Return the pictures that several cameras take at once, see :func:`photograph`."""
+    return [photograph(items, view, photometry, rng) for view in views]
 
 
 WEBCAM = Photometry(read_noise=3.0, shot_noise=0.0, blur=0.6)

@@ -81,8 +81,10 @@ def test_sh5_straight_arm():
 def test_sh6_squared_norms():
     plant, eyes = plant_k(), NoisyObserver(load_vision_noise("joint"))
     read = variants.loop_variants(0.2)
-    norm = handover.handovers(read["all 20 iterations"], plant, eyes, 1, 1, step_limit=80)[0]
-    square = handover.handovers(read["squared norm in Eq. (16)"], plant, eyes, 1, 1, step_limit=80)[0]
+    norm = handover.handovers(read["all 20 iterations"], plant, handover.Blocks(eyes, 1, 1), step_limit=80)[0]
+    square = handover.handovers(
+        read["squared norm in Eq. (16)"], plant, handover.Blocks(eyes, 1, 1), step_limit=80
+    )[0]
     assert norm["success"].mean() >= 0.8
     assert square["success"].sum() == 0
     assert square["miss_mm"].min() > 100
@@ -177,7 +179,9 @@ def test_sh17_two_frames():
 
 def test_sh18_third_step_size():
     eyes = NoisyObserver(load_vision_noise("thesis"))
-    runs, _ = handover.step_size_experiment({"K": plant_k()}, eyes, (0.2, 0.3, 0.4), 2, 1)
+    runs, _ = handover.compare(
+        handover.by_step_size((0.2, 0.3, 0.4)), {"K": plant_k()}, handover.Blocks(eyes, 2, 1)
+    )
     medians = {a: runs.loc[runs["alpha"] == a, "steps"].median() * timestep(a) for a in (0.2, 0.3, 0.4)}
     printed = 39.6 / 22.3
     assert abs(medians[0.2] / medians[0.4] - printed) < abs(medians[0.2] / medians[0.3] - printed)
@@ -235,8 +239,10 @@ def test_sh23_error_floor():
 def test_sh24_guidance_decreases_the_time():
     eyes = NoisyObserver(load_vision_noise("thesis"))
     plants = {"K": plant_k()}
-    alone, _ = handover.step_size_experiment(plants, eyes, (0.1,), 1, 1)
-    led, _ = handover.step_size_experiment(plants, eyes, (0.1,), 1, 1, guide=guidance.GuidingHand())
+    alone, _ = handover.compare(handover.by_step_size((0.1,)), plants, handover.Blocks(eyes, 1, 1))
+    led, _ = handover.compare(
+        handover.by_step_size((0.1,)), plants, handover.Blocks(eyes, 1, 1), guide=guidance.GuidingHand()
+    )
     assert led["steps"].median() < alone["steps"].median()
 
 
@@ -258,7 +264,7 @@ def test_without_the_correction_of_sh14_the_gripper_closes_far_away():
     parameters = replace(handover.thesis_parameters(0.2), stop_threshold=0.05**0.5)
     controller = HandoverController(parameters)
     rng = np.random.default_rng(0)
-    ball = handover.Scene().ball("front", ARM.tip_points(ARM.home)[3:], rng)
+    ball = handover.HOLDER.ball("front", rng)
     run = handover.run_handover(controller, plant_k(), eyes, ball, rng)
     assert run.mode == "grasp"
     assert not run.success

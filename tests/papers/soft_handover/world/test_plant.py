@@ -8,7 +8,7 @@ from soro_lib.papers.soft_handover.world.plant import (
     AngleLossPlant,
     ElasticPlant,
     Gripper,
-    Hand,
+    HoldingHand,
     LaggingPlant,
     Stiffness,
 )
@@ -87,14 +87,6 @@ def test_angle_loss_plant_realises_its_shares_and_all_lengths():
     )
 
 
-def test_play_keeps_the_arm_until_it_is_taken_up():
-    plant = AngleLossPlant((0.5, 0.5, 0.5), play=0.05)
-    forth = plant.settle(ARM.tendon_lengths(BENT))
-    back = plant.settle(ARM.tendon_lengths(BENT * np.tile([0.9, 0.9, 1.0], 3)))
-    assert np.abs(forth - back).max() <= 0.05
-    assert np.any(forth == back)
-
-
 @pytest.mark.parametrize("plant", [AngleLossPlant((0.5, 0.5, 0.5)), ElasticPlant()])
 def test_a_stiffer_hand_brings_the_gripper_closer_to_where_it_wants_it(plant):
     wanted = np.array([0.10, 0.0, 0.55, 0.10, 0.0, 0.65])
@@ -102,7 +94,9 @@ def test_a_stiffer_hand_brings_the_gripper_closer_to_where_it_wants_it(plant):
     misses = []
     for stiffness in (20.0, 200.0, 2000.0):
         plant.reset()
-        misses.append(np.linalg.norm(ARM.tip_points(plant.settle(tendons, Hand(wanted, stiffness))) - wanted))
+        misses.append(
+            np.linalg.norm(ARM.tip_points(plant.settle(tendons, HoldingHand(wanted, stiffness))) - wanted)
+        )
     assert misses[0] > misses[1] > misses[2]
     assert misses[2] < 0.03
 
@@ -127,7 +121,6 @@ def test_gripper_holds_what_lies_between_its_fingers():
     ("build", "message"),
     [
         (lambda: AngleLossPlant((0.0, 0.5, 0.5)), "realised"),
-        (lambda: AngleLossPlant((0.5, 0.5, 0.5), play=-1), "play"),
         (lambda: ElasticPlant(tendon_stiffness=0), "tendon_stiffness"),
         (lambda: ElasticPlant(gripper_mass=-1), "gripper_mass"),
         (lambda: Stiffness(bending=0), "bending"),

@@ -148,11 +148,9 @@ def test_a_ball_nowhere_is_refused(scene, ball):
         scene.items(scene.arm.home, ball)
 
 
-def test_a_state_of_another_size_and_an_impossible_grip_are_refused(scene):
+def test_a_state_of_another_size_is_refused(scene):
     with pytest.raises(ValueError, match="nine"):
         scene.wrist(np.zeros(6))
-    with pytest.raises(ValueError, match="grip"):
-        Extras(grip=1.5)
 
 
 def test_a_true_state_past_the_limits_of_the_commands_is_drawn(scene):
