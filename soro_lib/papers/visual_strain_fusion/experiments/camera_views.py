@@ -50,6 +50,11 @@ class View:
     image: Image
     frame: TrackedFrame
 
+    @property
+    def found(self) -> str:
+        """What the tracker found, in words."""
+        return f"{self.frame.inliers} of {self.frame.features} features fit" if self.frame.tracked else "lost"
+
 
 class FlightViewer:
     """Renders any frame of a stored flight again, and locates it in the map of that flight.

@@ -3,16 +3,14 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from soro_lib import paths
 from soro_lib.arcs import chain_transform
 from soro_lib.papers.visual_strain_fusion.world.fibre import FibreGratings, bond_spread
-from soro_lib.papers.visual_strain_fusion.world.plant import BackboneParameters
+from soro_lib.papers.visual_strain_fusion.world.plant import Array, BackboneParameters
 from soro_lib.robots.pneumatic import PneumaticArm
-
-Array = NDArray[np.float64]
 
 PERIOD = 0.05
 """Step of control and learning [s]."""
@@ -113,3 +111,8 @@ def glue_fibre(
     motion = spiral(400)
     reached = np.abs(fibre.shift(motion.configuration, motion.elongations)).max()
     return replace(fibre, transfer=fibre.transfer * largest_shift / reached)
+
+
+def glued_shifts(motion: ArmMotion, rng: np.random.Generator) -> Array:
+    """Noisy wavelength shifts ``(n, gratings)`` [m] of a motion by a fibre that is glued for it."""
+    return glue_fibre(rng).shift(motion.configuration, motion.elongations, rng)
