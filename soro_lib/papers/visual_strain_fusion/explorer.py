@@ -54,9 +54,8 @@ class FusionExplorer(ipywidgets.VBox):
 
     def __init__(self, seed: int = 1) -> None:
         self._seed = seed
-        self.flight = ipywidgets.Dropdown(
-            options=list(FLIGHTS), value="scene1_obstacles", description="flight"
-        )
+        names = list(FLIGHTS)
+        self.flight = ipywidgets.Dropdown(options=names, value="scene1_obstacles", description="flight")
         self.time = _slider("time [s]", 0.0, 199.95, 105.0, 0.05)
         self.switch = ipywidgets.ToggleButtons(options=list(SWITCHES))
         self.start = _slider("from [s]", 0.0, 195.0, 60.0, 0.5)

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -55,7 +56,6 @@ WHY_SAMPLES = (
     "the flick here is identical for all numbers of samples, and the network learns on in all of them"
 )
 WHY_ELM = "a network cannot predict the noise of its labels; the printed number is that of an interpolation"
-
 
 REASONS = {
     "accuracy": "two scenes only; no lens distortion, rolling shutter or hand-eye error: what is left is "
@@ -123,9 +123,9 @@ def table_findings(summary: pd.DataFrame) -> dict[str, Finding]:
                     for (statistic, column), reason in zip(STATISTICS.items(), (why, spread, share)):
                         finding = Finding(rows[f"{measure}_{column}"], reason)
                         findings[f"{cell}_{name}_{measure}_{statistic}"] = finding
-                findings[f"{cell}_{measure}_improvement"] = Finding(
-                    improved[f"{measure}_improvement_percent"], WHY_CIRCLE if path == "circle" else ""
-                )
+                why = WHY_CIRCLE if path == "circle" else ""
+                percent = improved[f"{measure}_improvement_percent"]
+                findings[f"{cell}_{measure}_improvement"] = Finding(percent, why)
     return findings | _table_claims(summary, literal)
 
 
@@ -137,13 +137,12 @@ def _table_claims(summary: pd.DataFrame, literal: pd.DataFrame) -> dict[str, Fin
     least, most = reduction.min(), reduction.max()
     why_learning = "the gain that grows with the step does it all; learning the rest costs a little"
     why_above = "the circle is easier here than in the paper at every gain but the lowest"
+    why_low = "the smallest printed one is of the circle"
     return {
         "s4d_hybrid_beats_model": Finding((least.min(axis=1) > 0.0).astype(float)),
         "s4d_learning_needed": Finding(learning, why_learning),
         "s5_error_reduction_above_80": Finding(above, why_above),
-        "abstract_improvement_low": Finding(
-            least.error_improvement_percent, "the smallest printed one is of the circle"
-        ),
+        "abstract_improvement_low": Finding(least.error_improvement_percent, why_low),
         "abstract_improvement_high": Finding(most.error_improvement_percent),
     }
 
@@ -238,16 +237,14 @@ def fusion_findings(
     }
     for name, estimate in (("slam", "camera"), ("fusion", "fused")):
         for label, window, statistic, reason in FINDING_ROWS:
-            value = _samples(errors, window, estimate, statistic)
-            findings["s4c1_" + label.format(name)] = Finding(value, REASONS[reason])
+            key, value = "s4c1_" + label.format(name), _samples(errors, window, estimate, statistic)
+            findings[key] = Finding(value, REASONS[reason])
             if reason in ("hand", "cover"):
-                share = Finding(100 * value / reach, REASONS[reason])
-                findings["s4c1_" + label.format(name) + "_percent"] = share
+                findings[f"{key}_percent"] = Finding(100 * value / reach, REASONS[reason])
         rmse = _samples(light_errors, "whole run", estimate, "rmse_mm")
+        why = REASONS.get(f"light {name}", REASONS["light"])
         findings[f"s4c2_{name}_rmse"] = Finding(rmse, REASONS["light"])
-        findings[f"s4c2_{name}_rmse_percent"] = Finding(
-            100 * rmse / reach, REASONS.get(f"light {name}", REASONS["light"])
-        )
+        findings[f"s4c2_{name}_rmse_percent"] = Finding(100 * rmse / reach, why)
     return findings
 
 
@@ -312,7 +309,7 @@ def paper_table(summary: pd.DataFrame, path: str) -> pd.DataFrame:
                 columns = [f"{measure}_{column}" for column in STATISTICS.values()]
                 mean, spread, share = means.loc[(gain, controller), columns]
                 row[f"{measure}, {name}"] = f"{mean:.3f} ± {spread:.3f} ({share:.1f} %)"
-            improvement = better.at[(gain, "literal"), f"{measure}_improvement_percent"]
+            improvement = better[f"{measure}_improvement_percent"][gain, "literal"]
             row[f"{measure}, improvement"] = f"{improvement:.1f} %"
         rows.append(row)
     return pd.DataFrame(rows)
@@ -364,7 +361,7 @@ def paper_beside_ours(findings: Mapping[str, Finding], table: str) -> pd.DataFra
     return _flat(wide)
 
 
-def _flat(wide: pd.DataFrame) -> pd.DataFrame:
+def _flat(wide: Any) -> pd.DataFrame:
     """Return a table with columns of several levels as one with a single row of names."""
     flat = wide.reset_index()
     names = [(name,) if isinstance(name, str) else name for name in flat.columns]

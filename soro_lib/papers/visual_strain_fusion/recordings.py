@@ -16,13 +16,7 @@ from typing import Any
 import numpy as np
 from rich.progress import Progress
 
-from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import (
-    COLUMNS,
-    FLIGHTS,
-    MAP_ARRAYS,
-    SLUG,
-    fly,
-)
+from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import COLUMNS, FLIGHTS, MAP_ARRAYS, fly
 from soro_lib.project import data_directory
 from soro_lib.replication.datacards import generator_options, read_card, write_card
 
@@ -50,7 +44,6 @@ def record(name: str, directory: Path, progress: MutableMapping[str, int], steps
     list of Path
         The two files.
     """
-
     flight = FLIGHTS[name]
     frames, point_map = fly(flight, SEED, steps, lambda done: progress.update({name: done}))
     table, points = directory / f"{name}.csv.gz", directory / f"{name}_map.npz"
@@ -89,7 +82,8 @@ def _record_all(names: Sequence[str], directory: Path, jobs: int, steps: int) ->
 
 def main(arguments: list[str] | None = None) -> int:
     """Record all flights, show the progress and say which files changed."""
-    parser = generator_options("Render and track the camera flights again.", data_directory(SLUG))
+    folder = data_directory("visual_strain_fusion")
+    parser = generator_options("Render and track the camera flights again.", folder)
     parser.add_argument("--jobs", type=int, default=min(len(FLIGHTS), os.cpu_count() or 1))
     parser.add_argument("--only", choices=list(FLIGHTS), help="record one flight only")
     options = parser.parse_args(arguments)

@@ -18,17 +18,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
+from soro_lib.papers.visual_strain_fusion.world import scene as surroundings
 from soro_lib.papers.visual_strain_fusion.world.motion import ArmMotion, move, spiral
-from soro_lib.papers.visual_strain_fusion.world.scene import (
-    ENDOSCOPE,
-    BrickScene,
-    Timeline,
-    ViewConditions,
-    moving_obstacles,
-    photograph,
-    undisturbed,
-    varying_light,
-)
+from soro_lib.papers.visual_strain_fusion.world.scene import ENDOSCOPE, BrickScene, ViewConditions, photograph
 from soro_lib.project import data_directory
 from soro_lib.replication.datacards import verified
 from soro_lib.sensing.monocular_vision import MonocularTracker, TrackedFrame, fit_similarity
@@ -48,17 +40,17 @@ class Flight:
     """One run: which scene, which disturbance."""
 
     scene: int
-    timeline: Timeline
+    timeline: surroundings.Timeline
     disturbance: str
 
 
 FLIGHTS = {
-    "scene1_undisturbed": Flight(1, undisturbed, "nothing"),
-    "scene2_undisturbed": Flight(2, undisturbed, "nothing"),
-    "scene1_obstacles": Flight(1, moving_obstacles, "moving obstacles"),
-    "scene1_light": Flight(1, varying_light, "varying light"),
-    "scene2_obstacles": Flight(2, moving_obstacles, "moving obstacles"),
-    "scene2_light": Flight(2, varying_light, "varying light"),
+    "scene1_undisturbed": Flight(1, surroundings.undisturbed, "nothing"),
+    "scene2_undisturbed": Flight(2, surroundings.undisturbed, "nothing"),
+    "scene1_obstacles": Flight(1, surroundings.moving_obstacles, "moving obstacles"),
+    "scene1_light": Flight(1, surroundings.varying_light, "varying light"),
+    "scene2_obstacles": Flight(2, surroundings.moving_obstacles, "moving obstacles"),
+    "scene2_light": Flight(2, surroundings.varying_light, "varying light"),
 }
 """The stored runs; settings were chosen on scene 1 and applied unchanged to scene 2."""
 

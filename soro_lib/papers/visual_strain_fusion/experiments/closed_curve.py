@@ -51,8 +51,8 @@ class CurveRun:
 
     Attributes
     ----------
-    tip, feedback, target : ndarray (steps, 2)
-        True tip, fused estimate and target [m].
+    tip, target : ndarray (steps, 2)
+        True tip and target [m].
     cycle : ndarray (steps,)
         1 model-based, 2 hybrid, 3 hybrid with a moving obstacle.
     lost : ndarray (steps,) of bool
@@ -60,7 +60,6 @@ class CurveRun:
     """
 
     tip: Array
-    feedback: Array
     target: Array
     cycle: NDArray[np.int64]
     lost: NDArray[np.bool_]
@@ -104,7 +103,6 @@ def fit_actuation_map(chambers: ChamberParameters) -> ActuationMap:
 
 def follow_curve(
     rng: np.random.Generator,
-    *,
     fitted_map: bool,
     wall: Wall | None = None,
     cycles: int = 3,
@@ -134,7 +132,7 @@ def follow_curve(
     steps = APPROACH + cycles * targets
     target = octopus(targets)[np.arange(-APPROACH, cycles * targets).clip(0) % targets]
     cycle = 1 + np.maximum(np.arange(steps) - APPROACH, 0) // targets
-    tips, feedback, lost = np.empty((steps, 2)), np.empty((steps, 2)), np.zeros(steps, dtype=bool)
+    tips, lost = np.empty((steps, 2)), np.zeros(steps, dtype=bool)
     for step in range(steps):
         configuration = plant.configuration
         pose = tip_pose(configuration)
@@ -146,8 +144,8 @@ def follow_curve(
         known = plant.motors if mapping is None else mapping.chamber_lengths(plant.motors)
         result = controller.update(estimate.pose[:2], target[step], known, compensating=bool(cycle[step] > 1))
         plant.drive(result.actuation if mapping is None else mapping.motor_lengths(result.actuation))
-        tips[step], feedback[step] = pose[:2], estimate.pose[:2]
-    return CurveRun(tips, feedback, target, cycle, lost)
+        tips[step] = pose[:2]
+    return CurveRun(tips, target, cycle, lost)
 
 
 CURVE_COLUMNS = ["cycle", "error_mm", "error_sd_mm", "error_max_mm", "deviation_mm", "deviation_sd_mm"]

@@ -153,24 +153,22 @@ def simulate_contacts(
         force += contact.force * profile[:, None] * np.array([np.cos(side), np.sin(side)])
         event[(time >= start) & (time < start + EVERY / 2.0)] = number
         if contact.place == "body":
-            squeeze += _under_finger(fibre, side) * np.maximum(_touching(contact.kind, profile), 0.0)[:, None]
+            # A push lasts, a flick touches only at its very beginning.
+            touching = profile if contact.kind == "push" else np.where(profile > 0.8, profile, 0.0)
+            squeeze += _under_finger(fibre, side) * np.maximum(touching, 0.0)[:, None]
     curvature = backbone.contact_curvature(force, np.full(steps, STATIONS[contact.place]))
     return move(spiral_bending(steps), backbone, curvature), event, squeeze
 
 
-def _touching(kind: str, profile: Array) -> Array:
-    """Force of the finger itself: a push lasts, a flick touches only at its very beginning."""
-    return profile if kind == "push" else np.where(profile > 0.8, profile, 0.0)
+def _under_finger(fibre: FibreGratings, side: float) -> Array:
+    """Share of the squeeze that every grating takes, from where the finger lies on the body.
 
-
-def _under_finger(
-    fibre: FibreGratings, side: float, half_height: float = 8e-3, half_angle: float = 0.6
-) -> Array:
-    """Share of the squeeze that every grating takes, from where the finger lies on the body."""
-    height = (fibre.height - STATIONS["body"] * fibre.length) / half_height
+    The finger covers 8 mm up and down, and 0.6 rad to either side.
+    """
+    height = (fibre.height - STATIONS["body"] * fibre.length) / 8e-3
     # The finger pushes toward `side`, so it lies on the opposite side of the body.
     around = (fibre.azimuth - side) % (2.0 * np.pi) - np.pi
-    return np.maximum(0.0, 1.0 - height**2) * np.maximum(0.0, 1.0 - (around / half_angle) ** 2)
+    return np.maximum(0.0, 1.0 - height**2) * np.maximum(0.0, 1.0 - (around / 0.6) ** 2)
 
 
 def motion_blur(motion: ArmMotion) -> Array:
@@ -203,9 +201,8 @@ def run_contacts(contact: Contact, rng: np.random.Generator, steps: int = 4000) 
     # Features are found less precisely along a blur; half its length is what the tracker cannot know.
     spread = np.asarray(LABEL_NOISE) * np.sqrt(1.0 + (blur[:, None] / 4.0) ** 2)
     seen[:, :3] += rng.normal(0.0, 1.0, (steps, 3)) * spread
-    settings = VisualStrainSettings(
-        initial_samples=contact.initial_samples, grating_noise=fibre.noise if contact.masking else 0.0
-    )
+    mask = fibre.noise if contact.masking else 0.0
+    settings = VisualStrainSettings(initial_samples=contact.initial_samples, grating_noise=mask)
     estimator = VisualStrainEstimator(ExtremeLearningMachine(rng), settings)
     positions = {name: np.empty((steps, 3)) for name in ("slam", "fibre", "fusion")}
     for step in range(steps):

@@ -13,14 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from soro_lib.estimators.extreme_learning_machine import ExtremeLearningMachine
-from soro_lib.papers.visual_strain_fusion.world.motion import (
-    PERIOD,
-    ArmMotion,
-    glued_shifts,
-    move,
-    spiral,
-    spiral_bending,
-)
+from soro_lib.papers.visual_strain_fusion.world.motion import PERIOD, ArmMotion, glued_shifts, spiral
 
 Array = NDArray[np.float64]
 
@@ -105,7 +98,6 @@ def learn_online(
     shifts: Array,
     labels: Array,
     truth: Array,
-    *,
     initial: int = INITIAL_SAMPLES,
 ) -> LearningRun:
     """Solve on the first samples, then predict and learn one by one.
@@ -124,8 +116,8 @@ def learn_online(
     hidden = network.hidden_output(shifts[:initial])
     network.fit(shifts[:initial], labels[:initial])
     steps = np.arange(initial, len(shifts))
-    prior, before, after = np.empty(len(steps)), np.empty((len(steps), 3)), np.empty((len(steps), 3))
-    trace = np.empty(len(steps))
+    prior, trace = np.empty((2, len(steps)))
+    before, after = np.empty((2, len(steps), 3))
     for row, step in enumerate(steps):
         prediction = network.predict(shifts[step])[:3]
         prior[row] = np.sqrt(np.sum((prediction - truth[step, :3]) ** 2))
@@ -201,23 +193,15 @@ def _steady(error: float, run: LearningRun, resolved: bool) -> float:
     return error if resolved else float(f"{error:.{UNRESOLVED_DIGITS}g}")
 
 
-SETTINGS_COLUMNS = (
-    "prior_mean_mm",
-    "prior_max_mm",
-    "prior_label_mm",
-    "posterior_label_mm",
-    "trace",
-    "condition",
-)
-
-
 def settings_table(networks: pd.DataFrame) -> pd.DataFrame:
     """Means over the seeds of `compare_networks`, as text: six digits, or words for what rounding decides.
 
     "diverged" is an error beyond `DIVERGED`, "beyond 1e+10" a trace or a condition beyond
     `ROUNDING_LIMIT`; a network whose trace is beyond it has `UNRESOLVED_DIGITS` digits of its errors.
     """
-    means = networks.groupby("network", sort=False)[list(SETTINGS_COLUMNS)].mean()
+    errors = [f"{error}_mm" for error in ("prior_mean", "prior_max", "prior_label", "posterior_label")]
+    columns = [*errors, "trace", "condition"]
+    means = networks.groupby("network", sort=False)[columns].mean()
     digits = np.where(np.isfinite(means["trace"]), 6, UNRESOLVED_DIGITS)
     words = dict.fromkeys(("trace", "condition"), f"beyond {ROUNDING_LIMIT:.0e}")
     text = {
@@ -225,7 +209,7 @@ def settings_table(networks: pd.DataFrame) -> pd.DataFrame:
             f"{value:.{count}g}" if np.isfinite(value) else words.get(column, "diverged")
             for value, count in zip(means[column], digits)
         ]
-        for column in SETTINGS_COLUMNS
+        for column in columns
     }
     return pd.DataFrame(text, index=means.index).reset_index()
 
@@ -277,9 +261,7 @@ def hold_still(seed: int) -> dict[str, LearningRun]:
     While the arm stands still every sample says the same; what it says nothing about is forgotten, and the
     covariance of those directions grows exponentially unless it is bounded.
     """
-    bending = spiral_bending(3000)
-    pause = np.repeat(bending[HOLD_START : HOLD_START + 1], HOLD_STEPS, axis=0)
-    motion = move(np.concatenate([bending[:HOLD_START], pause, bending[HOLD_START:]]))
+    motion = spiral(3000, (HOLD_START, HOLD_STEPS))
     rng = np.random.default_rng(seed)
     shifts, labels = measure(motion, rng)
     nodes = rng.integers(2**32)
@@ -311,7 +293,7 @@ def initial_samples(
             frozen.fit(shifts[:count], labels[:count])
             error = np.linalg.norm(frozen.predict(shifts[count:])[:, :3] - motion.pose[count:, :3], axis=1)
             learner = ExtremeLearningMachine(np.random.default_rng(nodes))
-            learning = learn_online(learner, shifts, labels, motion.pose, initial=count)
+            learning = learn_online(learner, shifts, labels, motion.pose, count)
             means = error[: round(10.0 / PERIOD)].mean(), error.mean(), learning.prior.mean()
             rows.append((count, number, *(1e3 * mean for mean in means)))
     return pd.DataFrame(rows, columns=["samples", "seed", "next_mm", "frozen_mm", "learning_mm"])

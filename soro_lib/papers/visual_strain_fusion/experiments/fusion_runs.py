@@ -14,13 +14,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, mannwhitneyu
 from threadpoolctl import threadpool_limits
 
+from soro_lib.estimators import pose_fusion
 from soro_lib.estimators.extreme_learning_machine import ExtremeLearningMachine
-from soro_lib.estimators.pose_fusion import (
-    InverseVarianceFusion,
-    fibre_weight,
-    fuse_poses,
-    inlier_weighted_error,
-)
 from soro_lib.estimators.visual_strain import VisualStrainEstimator, VisualStrainSettings
 from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import load_flight
 from soro_lib.papers.visual_strain_fusion.world.motion import ArmMotion, glued_shifts, spiral
@@ -144,7 +139,7 @@ def fuse_flight(frames: pd.DataFrame, motion: ArmMotion, rng: np.random.Generato
     poses = {
         "camera": camera,
         "fibre": fibre,
-        "printed": fuse_poses(camera, fibre, printed_error, **PRINTED_BOUNDS),
+        "printed": pose_fusion.fuse_poses(camera, fibre, printed_error, **PRINTED_BOUNDS),
         "fused": np.array([estimate.pose for estimate in estimates]),
         "filter": filtered,
     }
@@ -154,7 +149,7 @@ def fuse_flight(frames: pd.DataFrame, motion: ArmMotion, rng: np.random.Generato
         "phase": frames["phase"].to_numpy(),
         "tracked": 1 - lost,
         "step_mm": 1e3 * np.linalg.norm(np.diff(truth[:, :3], axis=0, prepend=truth[:1, :3]), axis=1),
-        "weight": fibre_weight(weighted, SETTINGS.lower, SETTINGS.upper),
+        "weight": pose_fusion.fibre_weight(weighted, SETTINGS.lower, SETTINGS.upper),
         "filter_distance": _squared_distance(filter_error, covariance),
         "filter_drift_distance": _squared_distance(filter_error, covariance + CAMERA_BIAS**2 * np.eye(3)),
     }
@@ -186,7 +181,7 @@ def blind(frames: pd.DataFrame, start: float, duration: float) -> pd.DataFrame:
 
 def _filter(camera: Array, camera_spread: Array, fibre: Array, fibre_spread: Array) -> tuple[Array, Array]:
     """Return the poses (n, 7) of the inverse-variance filter and its position covariances (n, 3, 3)."""
-    fusion = InverseVarianceFusion()
+    fusion = pose_fusion.InverseVarianceFusion()
     poses, covariance = np.empty_like(camera), np.empty((len(camera), 3, 3))
     for step in range(len(camera)):
         poses[step] = fusion.update(camera[step], camera_spread[step], fibre[step], fibre_spread[step])
@@ -326,11 +321,12 @@ def error_against_confidence(name: str) -> pd.DataFrame:
     frames = load_flight(name)
     frames = frames.assign(error=np.linalg.norm(camera_errors(frames), axis=1))
     tracked = frames[frames["tracked"] > 0]
+    mean_error, inliers = tracked["match_error_px"], tracked["inliers"]
     signs = {
         "mean error of the inliers (printed e_S)": tracked["inlier_error_px"],
-        "mean error of all matches": tracked["match_error_px"],
-        "inlier-weighted error": inlier_weighted_error(tracked["match_error_px"], tracked["inliers"]),
-        "fewer inliers": -tracked["inliers"],
+        "mean error of all matches": mean_error,
+        "inlier-weighted error": pose_fusion.inlier_weighted_error(mean_error, inliers),
+        "fewer inliers": -inliers,
         "spread by the Jacobian": tracked["spread_mm"],
     }
     table, error = pd.DataFrame(signs), tracked["error"]

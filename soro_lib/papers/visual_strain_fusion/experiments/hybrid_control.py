@@ -12,15 +12,8 @@ import numpy as np
 import pandas as pd
 
 from soro_lib.controllers.hybrid import HybridController, HybridSettings
-from soro_lib.papers.visual_strain_fusion.experiments.tracking import (
-    CYCLES,
-    GAINS,
-    FittedPlant,
-    TrackingRun,
-    load_plant,
-    path_points,
-    track,
-)
+from soro_lib.papers.visual_strain_fusion.experiments import tracking
+from soro_lib.papers.visual_strain_fusion.experiments.tracking import GAINS, FittedPlant, TrackingRun, track
 from soro_lib.papers.visual_strain_fusion.world.plant import Array, ChamberParameters, PneumaticPlant
 from soro_lib.robots.pneumatic import PneumaticArm
 
@@ -69,7 +62,7 @@ def compare_controllers(
     rng: np.random.Generator,
     *,
     seeds: int = 10,
-    cycles: int = CYCLES,
+    cycles: int = tracking.CYCLES,
     readings: Mapping[str, HybridSettings] = READINGS,
     plant: FittedPlant | None = None,
     maximum_step: float = 3e-3,
@@ -99,8 +92,8 @@ def compare_controllers(
     steps : int, optional
         Points of a cycle, as in `path_points`.
     """
-    plant = plant or load_plant(path)
-    points = path_points(path, plant.rotation, steps)
+    plant = plant or tracking.load_plant(path)
+    points = tracking.path_points(path, plant.rotation, steps)
     targets = np.tile(points, (cycles, 1))
     batch = (seeds, len(GAINS))
     base = HybridSettings(proportional_gain=np.array(GAINS), maximum_step=maximum_step, compensation="none")

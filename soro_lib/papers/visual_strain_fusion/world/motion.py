@@ -88,9 +88,14 @@ def move(
     return ArmMotion(time, elongations, configuration, tip_pose(configuration))
 
 
-def spiral(steps: int = 4000) -> ArmMotion:
-    """Predefined spiral of Secs. IV-B and IV-C: 200 s, about 40 mm from the start at its end."""
-    return move(spiral_bending(steps))
+def spiral(steps: int = 4000, hold: tuple[int, int] = (0, 0)) -> ArmMotion:
+    """Predefined spiral of Secs. IV-B and IV-C: 200 s, about 40 mm from the start at its end.
+
+    With `hold`, the arm stands still from one step on for so many steps.
+    """
+    bending = spiral_bending(steps)
+    pause = np.repeat(bending[hold[0] : hold[0] + 1], hold[1], axis=0)
+    return move(np.concatenate([bending[: hold[0]], pause, bending[hold[0] :]]))
 
 
 def glue_fibre(

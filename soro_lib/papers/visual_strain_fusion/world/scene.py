@@ -283,11 +283,7 @@ def add_lamp(image: Image, lamp: tuple[float, float]) -> Image:
 
 
 def photograph(
-    scene: BrickScene,
-    pose: ArrayLike,
-    conditions: ViewConditions,
-    noise: NDArray[np.float32],
-    photometry: Photometry | None = None,
+    scene: BrickScene, pose: ArrayLike, conditions: ViewConditions, noise: NDArray[np.float32]
 ) -> Image:
     """Return the picture that the camera in the tip takes.
 
@@ -301,14 +297,12 @@ def photograph(
         What disturbs the view.
     noise : array of the image's shape, float32
         Standard normal numbers for the sensor noise.
-    photometry : Photometry, optional
-        Sensor; its gain is multiplied by the ambient light.
 
     Returns
     -------
     array (height, width) or (height, width, 3), uint8
     """
-    sensor = photometry or Photometry()
+    sensor = Photometry()
     image = disturb(scene.image(tip_camera(pose)), conditions)
     if conditions.lamp is not None:
         image = add_lamp(image, conditions.lamp)
