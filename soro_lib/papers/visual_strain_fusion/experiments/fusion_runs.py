@@ -281,8 +281,7 @@ def window_errors(runs: pd.DataFrame, windows: Windows = WINDOWS) -> pd.DataFram
 def fusion_table(errors: pd.DataFrame, statistic: str = "mean_mm") -> pd.DataFrame:
     """Return one statistic of :func:`window_errors`: "mean [2.5 %, 97.5 %]" over fibres, by estimate."""
     grouped = errors.groupby(["flight", "window", "estimate"], sort=False)[statistic]
-    middle = grouped.mean()
-    low, high = grouped.quantile(0.025), grouped.quantile(0.975)
+    middle, low, high = grouped.mean(), grouped.quantile(0.025), grouped.quantile(0.975)
     text = [
         f"{value:.2f}" if top - bottom < 0.005 else f"{value:.2f} [{bottom:.2f}, {top:.2f}]"
         for value, bottom, top in zip(middle, low, high)
@@ -291,17 +290,15 @@ def fusion_table(errors: pd.DataFrame, statistic: str = "mean_mm") -> pd.DataFra
     return table[list(ESTIMATES)].reset_index()
 
 
-def coverage(runs: pd.DataFrame, probability: float = 0.95) -> pd.DataFrame:
-    """Return how often the truth lies in the filter's ellipsoid of a probability, per flight.
+def coverage(runs: pd.DataFrame) -> pd.DataFrame:
+    """Return how often the truth lies in the filter's ellipsoid of 95 %, per flight.
 
     Once with the filter's own covariance, which takes the drift of the map for white noise, and once with the
     variance of that drift, :data:`CAMERA_BIAS`, added back.
     """
-    bound = chi2.ppf(probability, 3)
-    inside = runs[["flight"]].assign(
-        own_covariance=runs["filter_distance"] < bound, with_drift=runs["filter_drift_distance"] < bound
-    )
-    return inside.groupby("flight", sort=False).mean().reset_index()
+    columns = {"filter_distance": "own_covariance", "filter_drift_distance": "with_drift"}
+    inside = runs[list(columns)].rename(columns=columns) < chi2.ppf(0.95, 3)
+    return inside.groupby(runs["flight"], sort=False).mean().reset_index()
 
 
 def error_against_confidence(name: str) -> pd.DataFrame:
@@ -318,9 +315,8 @@ def error_against_confidence(name: str) -> pd.DataFrame:
         Columns sign, rank_correlation (Spearman's, with the error) and finds_worst: the probability that the
         sign is larger in one of the worst hundredth of the frames than in another one; 0.5 is chance.
     """
-    frames = load_flight(name)
-    frames = frames.assign(error=np.linalg.norm(camera_errors(frames), axis=1))
-    tracked = frames[frames["tracked"] > 0]
+    tracked = load_flight(name).query("tracked > 0")
+    error = pd.Series(np.linalg.norm(camera_errors(tracked), axis=1), tracked.index)
     mean_error, inliers = tracked["match_error_px"], tracked["inliers"]
     signs = {
         "mean error of the inliers (printed e_S)": tracked["inlier_error_px"],
@@ -329,7 +325,7 @@ def error_against_confidence(name: str) -> pd.DataFrame:
         "fewer inliers": -inliers,
         "spread by the Jacobian": tracked["spread_mm"],
     }
-    table, error = pd.DataFrame(signs), tracked["error"]
+    table = pd.DataFrame(signs)
     worst = error >= error.quantile(0.99)
     larger = mannwhitneyu(table[worst], table[~worst]).statistic / (worst.sum() * (~worst).sum())
     correlation = table.corrwith(error, method="spearman")

@@ -109,7 +109,7 @@ def compare_controllers(
         last = track(body, controller, targets[shared:], compensating=False, rng=chance)
         compensated[name] = track(body, controller, targets, compensating=True, rng=chance)
     tips = first.tip if last is None else np.concatenate([first.tip, last.tip])
-    return Comparison(path, points, TrackingRun(tips, targets, first.saturated), compensated)
+    return Comparison(path, points, TrackingRun(tips, targets), compensated)
 
 
 def _vary(
@@ -118,11 +118,10 @@ def _vary(
     """Plants that differ from seed to seed; the same for all gains of a seed."""
     if spread == 0.0:
         return chambers
-    factors = {
-        name: getattr(chambers, name) * np.exp(rng.normal(0.0, spread, (seeds, 1, 1)))
-        for name in ("gain", "resolution", "play", "dead_band", "softness", "exponent", "suction")
-    }
-    return ChamberParameters(**factors)
+    varied = {}
+    for name, value in vars(chambers).items():
+        varied[name] = value * np.exp(rng.normal(0.0, spread, (seeds, 1, 1)))
+    return ChamberParameters(**varied)
 
 
 def summarise(comparison: Comparison) -> pd.DataFrame:
@@ -133,24 +132,20 @@ def summarise(comparison: Comparison) -> pd.DataFrame:
     pandas.DataFrame
         Columns path, controller, gain, seed, error_mm, error_sd_mm, error_percent (of 3 mm),
         deviation_mm, deviation_sd_mm, deviation_percent (mean of deviation over distance of the path point
-        from the start), saturated.
+        from the start).
     """
     radius = np.linalg.norm(comparison.model.target, axis=-1)[:, None, None]
     tables = []
     for name, run in comparison.runs.items():
         error, deviation = 1e3 * run.error, 1e3 * run.deviation(comparison.points)
-        values = {
-            "error_mm": error.mean(axis=0),
-            "error_sd_mm": error.std(axis=0),
-            "error_percent": 100.0 * error.mean(axis=0) / 3.0,
-            "deviation_mm": deviation.mean(axis=0),
-            "deviation_sd_mm": deviation.std(axis=0),
-            "deviation_percent": 100.0 * (deviation / (1e3 * radius)).mean(axis=0),
-        }
         seed, column = np.indices(error.shape[1:]).reshape(2, -1)
         keys = {"path": comparison.path, "controller": name, "gain": np.array(GAINS)[column], "seed": seed}
-        columns = {measure: value.ravel() for measure, value in values.items()}
-        tables.append(pd.DataFrame({**keys, **columns, "saturated": run.saturated}))
+        table = pd.DataFrame(keys)
+        for measure, values, whole in zip(MEASURES, (error, deviation), (3.0, 1e3 * radius)):
+            table[f"{measure}_mm"] = values.mean(axis=0).ravel()
+            table[f"{measure}_sd_mm"] = values.std(axis=0).ravel()
+            table[f"{measure}_percent"] = 100.0 * (values / whole).mean(axis=0).ravel()
+        tables.append(table)
     return pd.concat(tables, ignore_index=True)
 
 

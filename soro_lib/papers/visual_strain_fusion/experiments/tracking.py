@@ -60,7 +60,7 @@ class FittedPlant:
 
 
 def load_plant(path: str, hypothesis: str = "cap_3mm") -> FittedPlant:
-    """Plant that was fitted to the model-based columns of the tables, see `soro_lib.calibrations`.
+    """Plant that was fitted to the model-based columns of the tables, see `calibration`.
 
     Parameters
     ----------
@@ -94,13 +94,10 @@ class TrackingRun:
         True tip position [m].
     target : ndarray (steps, 2) or (steps, ..., 2)
         Target position, common or one per member of the batch [m].
-    saturated : float
-        Share of the steps in which a chamber length met its limit.
     """
 
     tip: Array
     target: Array
-    saturated: float
 
     @property
     def error(self) -> Array:
@@ -144,13 +141,9 @@ def track(
         Draws the noise of the position sensor; none without it.
     """
     tips = np.empty((len(targets), *plant.motors.shape[:-1], 2))
-    saturated = 0.0
     tip = plant.tip[..., :2]
     for step, target in enumerate(targets):
         measured = tip if rng is None else tip + rng.normal(0.0, SENSOR_NOISE, tip.shape)
-        result = controller.update(measured, target, plant.motors, compensating)
-        plant.drive(result.actuation)
-        tip = plant.tip[..., :2]
-        tips[step] = tip
-        saturated += float(result.saturated.mean()) / len(targets)
-    return TrackingRun(tips, targets, saturated)
+        plant.drive(controller.update(measured, target, plant.motors, compensating).actuation)
+        tips[step] = tip = plant.tip[..., :2]
+    return TrackingRun(tips, targets)

@@ -83,8 +83,12 @@ def fig05b_trajectories(frames: pd.DataFrame) -> Figure:
 
 def fig05c_stitched(front: Image, side: Image) -> Figure:
     """Pictures of a flight, hung in space at the estimated poses: from the front and from the side."""
-    figure, columns = new_figure(PAGE_WIDTH, 3.5, 1, 2, width_ratios=(1.0, 1.25))
-    for axes, image, title in zip(columns, (front, side), ("front", "side")):
+    return _pictures({"front": front, "side": side}, 3.5, width_ratios=(1.0, 1.25))
+
+
+def _pictures(images: Mapping[str, Image], height: float, **options: Any) -> Figure:
+    figure, columns = new_figure(PAGE_WIDTH, height, 1, 2, **options)
+    for axes, (title, image) in zip(columns, images.items()):
         _show(axes, _trimmed(image), title)
     return figure
 
@@ -180,11 +184,7 @@ def fig06c_trajectories(run: pd.DataFrame, truth: NDArray[np.float64]) -> Figure
 
 def fig08_reconstructions(obstacles: Image, light: Image) -> Figure:
     """Pictures of the disturbed flights, hung in space at the fused poses."""
-    figure, columns = new_figure(PAGE_WIDTH, 3.7, 1, 2)
-    titles = "(a) moving obstacles", "(b) varying light"
-    for axes, image, title in zip(columns, (obstacles, light), titles):
-        _show(axes, _trimmed(image), title)
-    return figure
+    return _pictures({"(a) moving obstacles": obstacles, "(b) varying light": light}, 3.7)
 
 
 def fusion_compared(errors: pd.DataFrame, windows: Sequence[str], labels: Mapping[str, str]) -> Figure:
@@ -244,9 +244,8 @@ def explorer_plots(run: pd.DataFrame, shifts: NDArray[np.float64], step: int, tr
     truth : array (n, 3)
         True tip positions [m].
     """
-    figure, ((errors, paths), (weights, gratings)) = new_figure(
-        PAGE_WIDTH, 4.6, 2, 2, width_ratios=(1.6, 1.0)
-    )
+    figure, cells = new_figure(PAGE_WIDTH, 4.6, 2, 2, width_ratios=(1.6, 1.0))
+    (errors, paths), (weights, gratings) = cells
     now = float(run["time_s"].iloc[step])
     near = run[run["time_s"].between(now - 15, now + 15)]
     for name, style in (("camera", CAMERA), ("fibre", FIBRE), ("fused", FUSED)):

@@ -14,11 +14,11 @@ from soro_lib.papers.visual_strain_fusion.experiments.tracking import GAINS, pat
 from soro_lib.papers.visual_strain_fusion.world.motion import PERIOD
 from soro_lib.papers.visual_strain_fusion.world.plant import Wall
 from soro_lib.replication.plotting import COLORS, PAGE_WIDTH, REFERENCE, label_axes, legend, new_figure
-from soro_lib.replication.scorecard import build_scorecard
+from soro_lib.replication.published import load_published
 
-MODEL: dict[str, Any] = {"color": COLORS["grey"], "linewidth": 1.0}
-HYBRID: dict[str, Any] = {"color": COLORS["blue"], "linewidth": 1.2}
-OBSTRUCTED: dict[str, Any] = {"color": COLORS["orange"], "linewidth": 1.2}
+MODEL: dict[str, Any] = {"color": COLORS["grey"], "linewidth": 1.0, "label": "model-based"}
+HYBRID: dict[str, Any] = {"color": COLORS["blue"], "linewidth": 1.2, "label": "hybrid"}
+OBSTRUCTED = {**HYBRID, "color": COLORS["orange"], "label": "hybrid behind an obstacle"}
 CONTROLLERS = {
     "model": ("model-based", COLORS["grey"], "s"),
     "literal": ("Eq. (29) as printed", COLORS["blue"], "o"),
@@ -82,10 +82,9 @@ def _draw_tracking(comparison: Comparison, gain: float) -> Figure:
     """Draw the runs of the first seed at one gain."""
     figure, path, error, deviation = _path_and_errors(3.4, comparison.points)
     member = 0, GAINS.index(gain)
-    runs = {"model-based": (comparison.model, MODEL), "hybrid": (comparison.compensated["literal"], HYBRID)}
-    for name, (run, style) in runs.items():
+    for run, style in ((comparison.model, MODEL), (comparison.compensated["literal"], HYBRID)):
         tips = run.tip[:, *member]
-        path.plot(*(1e3 * tips).T, **style, label=name)
+        path.plot(*(1e3 * tips).T, **style)
         time = PERIOD * np.arange(len(tips))
         error.plot(time, 1e3 * run.error[:, *member], **style)
         deviation.plot(time, 1e3 * path_distance(tips, comparison.points), **style)
@@ -102,13 +101,9 @@ def _draw_zoom(comparison: Comparison, gains: tuple[float, float]) -> Figure:
     x, y = 1e3 * points[np.argmin(points[:, 1])]
     for panel, gain in zip(axes, gains):
         _draw_path(panel, points)
-        runs = {
-            "model-based": (comparison.model, MODEL),
-            "hybrid": (comparison.compensated["literal"], HYBRID),
-        }
-        for name, (run, style) in runs.items():
-            tips = run.tip[len(points) :, 0, GAINS.index(gain)]
-            panel.plot(*(1e3 * tips).T, **style, label=f"{name}, second cycle")
+        for run, style in ((comparison.model, MODEL), (comparison.compensated["literal"], HYBRID)):
+            tips, label = run.tip[len(points) :, 0, GAINS.index(gain)], f"{style['label']}, second cycle"
+            panel.plot(*(1e3 * tips).T, **{**style, "label": label})
         panel.set(xlim=(x - 14, x + 14), ylim=(y - 4, y + 20))
         label_axes(panel, title=f"Kp = {gain:.2f}")
     legend(figure)
@@ -138,9 +133,9 @@ def tables12_learning_or_gain(summary: pd.DataFrame) -> Figure:
 def cap_or_no_cap(summaries: Mapping[str, pd.DataFrame]) -> Figure:
     """Draw the model-based error over the gain under several hypotheses about the 3 mm, and as published."""
     figure, axes = new_figure(PAGE_WIDTH, 3.2, columns=2)
-    published = build_scorecard("visual_strain_fusion", {}).set_index("id")["published"]
+    published = load_published("visual_strain_fusion")
     for panel, table, path in zip(axes, ("table1", "table2"), ("pentagram", "circle")):
-        cells = [published[f"{table}_kp{100 * gain:02.0f}_model_error_mean"] for gain in GAINS]
+        cells = [published[f"{table}_kp{100 * gain:02.0f}_model_error_mean"].value for gain in GAINS]
         panel.plot(GAINS, cells, "x", color=COLORS["black"], markersize=8, zorder=5, label="published")
         for name, summary in summaries.items():
             model = summary[(summary.controller == "model") & (summary.path == path)]
@@ -175,11 +170,7 @@ def fig14c_beside_a_rod(run: CurveRun, wall: Wall) -> Figure:
 
 def _draw_curve(run: CurveRun, cycles: tuple[int, ...]) -> Figure:
     figure, path, *panels = _path_and_errors(3.6, octopus())
-    styles = {
-        1: {**MODEL, "label": "model-based"},
-        2: {**HYBRID, "label": "hybrid"},
-        3: {**OBSTRUCTED, "label": "hybrid behind an obstacle"},
-    }
+    styles = {1: MODEL, 2: HYBRID, 3: OBSTRUCTED}
     time = PERIOD * np.arange(len(run.tip))
     lost = (run.lost & np.isin(run.cycle, cycles)).tolist()
     for cycle in cycles:
