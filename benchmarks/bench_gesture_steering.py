@@ -15,7 +15,7 @@ from benchmarks.run import Row, compare, seconds_per_call
 from soro_lib.controllers.gesture_steering import GestureSteering, replay
 from soro_lib.controllers.steering_step import ReadableStep, StepBounds, StepWeights, pose_step, solve
 from soro_lib.estimators.palm_filter import PalmFilter, ReadablePalmFilter
-from soro_lib.papers.gesture_steering.experiments.hands import load_recording
+from soro_lib.papers.gesture_steering.recordings import load_recording
 from soro_lib.robots import CableDrivenArm
 from soro_lib.robots.cable_driven_kernels import compiled_kinematics, generic_kinematics
 from soro_lib.sensing.hand_tracking import hand_samples

@@ -1,27 +1,20 @@
 """Beyond the paper: reach, a fist that keeps its direction, delay against rate, error ellipses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from soro_lib.controllers.gesture_steering import SteeringSettings
 from soro_lib.controllers.hand_mapping import PalmMapping
 from soro_lib.controllers.steering_step import StepBounds, StepWeights, pose_step, solve
 from soro_lib.papers.gesture_steering.experiments import steering
-from soro_lib.papers.gesture_steering.experiments.steering import ServoBus, commanding_hand
-from soro_lib.papers.gesture_steering.world.hand import QUIET
+from soro_lib.papers.gesture_steering.experiments.steering import ServoBus, commanding_hand, pointing
+from soro_lib.papers.gesture_steering.world.hand import QUIET, Array
 from soro_lib.robots import CableDrivenArm
 from soro_lib.robots.cable_driven_kernels import compiled_kinematics
 
-Array = NDArray[np.float64]
 
-
-def reached(
-    arm: CableDrivenArm, positions: Array, directions: Array, iterations: int = 40
-) -> tuple[Array, Array]:
+def reached(arm: CableDrivenArm, positions: Array, directions: Array) -> tuple[Array, Array]:
     """Return how close the arm comes to poses: distances (n,) [m] and angles (n,) [rad], by repeated Eq.
     (26).
 
@@ -33,23 +26,20 @@ def reached(
         The arm.
     positions, directions : ndarray (n, 3)
         Wanted tips [m] and unit pointing directions.
-    iterations : int
-        Linearised steps per start [-].
     """
     kinematics = compiled_kinematics(arm)
-    weights = StepWeights(damping=0.1)
+    weights, largest = StepWeights(damping=0.1), np.array([0.02, *[0.5] * 6])
     found = np.full((len(positions), 2), np.inf)
     for index, (position, direction) in enumerate(zip(positions, directions)):
         for tension in (0.05, 0.8):
             actuation = np.array([np.clip(position[2] - 0.09, 0.0, arm.slide_length), *[-tension] * 6])
-            for _ in range(iterations):
+            for _ in range(40):
                 pose = kinematics(actuation)
                 wanted = np.clip(position - pose.tip, -0.02, 0.02)
-                lower = np.maximum(arm.lower - actuation, -np.array([0.02, *[0.5] * 6]))
-                upper = np.minimum(arm.upper - actuation, np.array([0.02, *[0.5] * 6]))
-                step = solve(
-                    pose_step(pose, wanted, direction - pose.direction, StepBounds(lower, upper), weights)
-                )
+                lower = np.maximum(arm.lower - actuation, -largest)
+                upper = np.minimum(arm.upper - actuation, largest)
+                bounds = StepBounds(lower, upper)
+                step = solve(pose_step(pose, wanted, direction - pose.direction, bounds, weights))
                 actuation = np.clip(actuation + step.actuation_step, arm.lower, arm.upper)
                 if np.abs(step.actuation_step).max() < 1e-5:
                     break
@@ -59,9 +49,7 @@ def reached(
     return found[:, 0], found[:, 1]
 
 
-def reach_map(
-    heights: Array, radii: Array, tilts: Array, azimuths: int = 6, arm: CableDrivenArm | None = None
-) -> pd.DataFrame:
+def reach_map(heights: Array, radii: Array, tilts: Array, azimuths: int = 6) -> pd.DataFrame:
     """Find the largest tilt that the tip can take towards every azimuth.
 
     Parameters
@@ -72,8 +60,6 @@ def reach_map(
         Tilts that are tried, ascending [rad].
     azimuths : int
         Directions of tilt, relative to the tip's own azimuth [-].
-    arm : CableDrivenArm, optional
-        The arm.
 
     Returns
     -------
@@ -81,20 +67,13 @@ def reach_map(
         ``z_mm``, ``radius_mm``, ``tilt_deg``: largest tilt reached within 0.5 mm and 1 deg towards every
         azimuth; NaN where not even a straight tip is.
     """
-    arm = arm or CableDrivenArm()
-    rows = []
+    arm, rows = CableDrivenArm(), []
     for height in heights:
         for radius in radii:
             best = np.nan
             for tilt in tilts:
                 around = 2 * np.pi * np.arange(azimuths if tilt > 0 else 1) / azimuths
-                directions = np.column_stack(
-                    [
-                        np.sin(tilt) * np.cos(around),
-                        np.sin(tilt) * np.sin(around),
-                        np.full_like(around, np.cos(tilt)),
-                    ]
-                )
+                directions = pointing(np.full_like(around, tilt), around)
                 positions = np.tile([radius, 0.0, height], (len(around), 1))
                 distance, angle = reached(arm, positions, directions)
                 if (distance > 0.5e-3).any() or (angle > np.deg2rad(1.0)).any():
@@ -104,18 +83,13 @@ def reach_map(
     return pd.DataFrame(rows, columns=["z_mm", "radius_mm", "tilt_deg"])
 
 
-def mapping_choice(reach: pd.DataFrame, scales: tuple[float, ...] = (-0.05, -0.1, -0.15, -0.2),
-                   offsets: tuple[float, ...] = (0.150, 0.165)) -> pd.DataFrame:  # fmt: skip
+def mapping_choice(reach: pd.DataFrame) -> pd.DataFrame:
     """Judge choices of c_z and offset by what share of the allowed box the arm can serve.
 
     Parameters
     ----------
     reach : DataFrame
         From :func:`reach_map`.
-    scales : tuple of float
-        c_z [-].
-    offsets : tuple of float
-        [m].
 
     Returns
     -------
@@ -128,17 +102,15 @@ def mapping_choice(reach: pd.DataFrame, scales: tuple[float, ...] = (-0.05, -0.1
     side = np.linspace(-0.15, 0.15, 13)
     x, z = (axis.ravel() for axis in np.meshgrid(side, side))
     rows = []
-    for offset in offsets:
-        for scale in scales:
+    for offset in (0.150, 0.165):
+        for scale in (-0.05, -0.1, -0.15, -0.2):
             mapping = PalmMapping(scale_z=scale, offset=offset)
             palms = np.linspace(mapping.lowest, mapping.highest, 13)
             tips = np.array([mapping.position((a, b, c)) for b in palms for a, c in zip(x, z)]) * 1e3
             tilt = _interpolated(grid, tips[:, 2], np.hypot(tips[:, 0], tips[:, 1]))
-            low, high = tips[:, 2].min(), tips[:, 2].max()
+            shares = np.mean(tilt >= 0), np.mean(tilt >= 20 - 1e-9)
             clamp = max(float(np.percentile(tilt, 10)), 0.0)
-            rows.append(
-                (scale, offset * 1e3, low, high, np.mean(tilt >= 0), np.mean(tilt >= 20 - 1e-9), clamp)
-            )
+            rows.append((scale, offset * 1e3, tips[:, 2].min(), tips[:, 2].max(), *shares, clamp))
     columns = ["scale_z", "offset_mm", "z_low_mm", "z_high_mm", "straight", "tilt_20", "clamp_deg"]
     return pd.DataFrame(rows, columns=columns)
 
@@ -156,24 +128,22 @@ def clamp_study(table: pd.DataFrame) -> pd.DataFrame:
         ``limit``, mean, 95 % and largest ``position_*_mm`` and ``direction_*_deg`` between tip and target
         outside the fist, and ``asked_deg``: mean tilt that is asked for.
     """
+    limits = {
+        "30 deg everywhere": PalmMapping(),
+        "15 deg everywhere": PalmMapping(maximum_tilt=np.deg2rad(15.0)),
+        "reach-aware": REACH_AWARE,
+    }
     rows = []
-    for name, mapping in (
-        ("30 deg everywhere", PalmMapping()),
-        ("15 deg everywhere", PalmMapping(maximum_tilt=np.deg2rad(15.0))),
-        ("reach-aware", REACH_AWARE),
-    ):
+    for name, mapping in limits.items():
         found = steering.result_table(steering.steered(table, SteeringSettings(mapping=mapping)))
         found = found[(found["mode"] != "fist") & (found["reason"] == "")]
         tilt = np.hypot(found["goal_alpha_deg"], found["goal_gamma_deg"]).mean()
-        errors = [_summary(found[column]) for column in ("position_error_mm", "direction_error_deg")]
-        rows.append((name, *errors[0], *errors[1], tilt))
-    columns = [f"{kind}_{what}_{unit}" for kind, unit in (("position", "mm"), ("direction", "deg"))
-               for what in ("mean", "p95", "max")]  # fmt: skip
+        errors = found[["position_error_mm", "direction_error_deg"]]
+        values = np.transpose([errors.mean(), errors.quantile(0.95), errors.max()])
+        rows.append((name, *values.ravel(), tilt))
+    statistics = ("mean", "p95", "max")
+    columns = [kind % what for kind in ("position_%s_mm", "direction_%s_deg") for what in statistics]
     return pd.DataFrame(rows, columns=["limit", *columns, "asked_deg"])
-
-
-def _summary(values: pd.Series) -> tuple[float, float, float]:
-    return float(values.mean()), float(values.quantile(0.95)), float(values.max())
 
 
 def _interpolated(grid: pd.DataFrame, z: Array, radius: Array) -> Array:
@@ -203,8 +173,8 @@ def fist_direction(
         mid = fist[["mid_x_mm", "mid_y_mm", "mid_z_mm"]]
         drift = np.linalg.norm(mid - mid.iloc[0], axis=1).max()
         after = table[table["time_s"] > fist["time_s"].max() - 0.05]
-        rows.append((weight, fist["direction_error_deg"].mean(), fist["position_error_mm"].mean(), drift,
-                     steering.direction_steps(after).max()))  # fmt: skip
+        errors = fist["direction_error_deg"].mean(), fist["position_error_mm"].mean()
+        rows.append((weight, *errors, drift, steering.direction_steps(after).max()))
     columns = ["weight", "direction_error_deg", "position_error_mm", "mid_drift_mm", "exit_step_deg"]
     return pd.DataFrame(rows, columns=columns)
 
@@ -213,9 +183,7 @@ RATES = (115.0, 58.0, 33.0, 15.0, 11.0, 5.0)
 """Rates of the loop whose delay is measured [Hz]; the first is the sensor's own."""
 
 
-def delay_against_rate(
-    rng_seed: np.random.SeedSequence, rates: tuple[float, ...] = RATES, bus: ServoBus | None = None
-) -> pd.DataFrame:
+def delay_against_rate(rng_seed: np.random.SeedSequence, rates: tuple[float, ...] = RATES) -> pd.DataFrame:
     """Measure the delay from the hand to the commanded tip for several loop rates.
 
     The hand follows the infinity path while its tilt sways; the delay is the shift that fits the commanded
@@ -227,26 +195,26 @@ def delay_against_rate(
         ``loop``, ``position_ms``, ``direction_ms``; the last row, "servo bus", waits for the bus in each
         loop.
     """
-    bus = bus or ServoBus()
+
+    def tilt(time: Array) -> Array:
+        return 0.25 * np.sin(2 * np.pi * np.asarray(time) / 4.0)
 
     def sway(time: Array) -> Array:
-        tilt = 0.25 * np.sin(2 * np.pi * np.asarray(time) / 4.0)
-        return np.column_stack([np.sin(tilt), np.zeros_like(tilt), np.cos(tilt)])
+        return np.column_stack([np.sin(tilt(time)), np.zeros_like(time), np.cos(tilt(time))])
 
     table = commanding_hand(np.random.default_rng(rng_seed), 16.0, steering.infinity_path, sway, noise=QUIET)
-    rows: list[tuple[str, float, float]] = []
-    for name, interval, busy in (
-        *((f"{rate:.0f} Hz", 1.0 / rate if rate < 100 else 0.0, 0.0) for rate in rates),
-        ("servo bus", bus.period, bus.period),
-    ):
+    busy_period = ServoBus().period
+    loops = [(f"{rate:.0f} Hz", 1.0 / rate if rate < 100 else 0.0, 0.0) for rate in rates]
+    rows = []
+    for name, interval, busy in (*loops, ("servo bus", busy_period, busy_period)):
         commands = steering.result_table(steering.steered(table, interval=interval), steering.LEAD)
         applied = commands["time_s"].to_numpy() + busy
         fine = np.arange(1.0, 15.0, 0.001)
         held = np.searchsorted(applied, fine, side="right") - 1
         tip = commands["tip_x_mm"].to_numpy()[held] * 1e-3
         alpha = np.deg2rad(commands["alpha_deg"].to_numpy()[held])
-        intended = [steering.infinity_path(fine)[:, 0], 0.25 * np.sin(2 * np.pi * fine / 4.0)]
-        rows.append((name, _delay(fine, tip, intended[0]), _delay(fine, alpha, intended[1])))
+        position = _delay(fine, tip, steering.infinity_path(fine)[:, 0])
+        rows.append((name, position, _delay(fine, alpha, tilt(fine))))
     return pd.DataFrame(rows, columns=["loop", "position_ms", "direction_ms"])
 
 
@@ -263,6 +231,6 @@ def sensor_rate_error(rng_seed: np.random.SeedSequence) -> pd.DataFrame:
     rows = []
     for name, interval in (("sensor", 0.0), ("30 ms", 0.030), ("90 ms", 0.090)):
         table = steering.fig7a(np.random.default_rng(rng_seed), interval=interval)
-        rows.append((name, table["position_error_mm"].mean(), table["position_error_mm"].max(),
-                     table["direction_error_deg"].max()))  # fmt: skip
+        error = table["position_error_mm"]
+        rows.append((name, error.mean(), error.max(), table["direction_error_deg"].max()))
     return pd.DataFrame(rows, columns=["loop", "position_mean_mm", "position_max_mm", "direction_max_deg"])

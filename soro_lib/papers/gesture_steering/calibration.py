@@ -5,8 +5,6 @@ not the seven actuator values. They are fitted here, openly; what follows from t
 positions counts as calibrated, never as reproduced.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,15 +26,11 @@ POINTS = ("base", "mid", "tip")
 """Frames {B}, {M}, {T} of the paper."""
 
 
-def table2_positions() -> pd.DataFrame:
-    """Load the printed positions of Table II: ``configuration``, ``point``, ``sim_*_mm``, ``exp_*_mm``."""
-    return pd.read_csv(data_directory("gesture_steering") / "table2_positions.csv")
-
-
 def printed_positions(kind: str) -> Array:
-    """Return the positions (4 configurations, 3 points, 3 axes) [m]; ``kind`` is "sim" or "exp"."""
+    """Return the positions (4 configurations, 3 points, 3 axes) [m] of Table II; kind is "sim" or "exp"."""
+    table = pd.read_csv(data_directory("gesture_steering") / "table2_positions.csv")
     columns = [f"{kind}_{axis}_mm" for axis in "xyz"]
-    return table2_positions()[columns].to_numpy(dtype=float).reshape(4, 3, 3) * 1e-3
+    return table[columns].to_numpy(dtype=float).reshape(4, 3, 3) * 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +54,11 @@ class FittedPose:
     tip_residual: float
 
 
-def fitted_pose(
-    arm: CableDrivenArm, base: Array, mid: Array, tip: Array, pretension: float = 0.02
-) -> FittedPose:
+def fitted_pose(arm: CableDrivenArm, base: Array, mid: Array, tip: Array) -> FittedPose:
     """Fit the actuation to printed base, mid and tip positions (3,) [m] by bounded least squares."""
     kinematics = compiled_kinematics(arm)
     lower, upper = arm.lower.copy(), arm.upper.copy()
-    upper[1:] = -pretension
+    upper[1:] = -0.02  # pretension [N]
 
     def residual(actuation: Array) -> Array:
         pose = kinematics(actuation)
@@ -75,23 +67,15 @@ def fitted_pose(
         return np.concatenate([slide, (pose.mid - mid) * 1e3, (pose.tip - tip) * 1e3, least_tension])
 
     def slope(actuation: Array) -> Array:
-        pose = kinematics(actuation)
-        return np.vstack(
-            [1e3 * np.eye(7)[:1], pose.mid_jacobian * 1e3, pose.tip_jacobian * 1e3, 1e-3 * np.eye(7)[1:]]
-        )
+        pose, unit = kinematics(actuation), np.eye(7)
+        return np.vstack([1e3 * unit[:1], pose.mid_jacobian * 1e3, pose.tip_jacobian * 1e3, 1e-3 * unit[1:]])
 
-    starts = [np.concatenate([[base[2]], np.full(6, tension)]) for tension in (-0.1, -0.5, -1.0)]
-    starts = [np.clip(start, lower, upper) for start in starts]
+    starts = [np.clip([base[2], *[cable] * 6], lower, upper) for cable in (-0.1, -0.5, -1.0)]
     fits = [least_squares(residual, start, slope, bounds=(lower, upper), x_scale="jac") for start in starts]
     actuation = min(fits, key=lambda fit: fit.cost).x
     pose = kinematics(actuation)
-    return FittedPose(
-        actuation,
-        pose.mid,
-        pose.tip,
-        float(np.linalg.norm(pose.mid - mid)),
-        float(np.linalg.norm(pose.tip - tip)),
-    )
+    residuals = (float(np.linalg.norm(found - point)) for found, point in ((pose.mid, mid), (pose.tip, tip)))
+    return FittedPose(actuation, pose.mid, pose.tip, *residuals)
 
 
 def table2_poses(arm: CableDrivenArm | None = None) -> list[FittedPose]:

@@ -63,10 +63,8 @@ class SteeringExplorer(ipywidgets.VBox):
         self.gesture = ipywidgets.ToggleButtons(options=[(MODE_NAMES[name], name) for name in FINGER_FLAGS])
         self.gesture.style.button_width = "92px"
         self.height = _slider("height [mm]", 100.0, 400.0, 200.0)
-        self.pitch, self.roll = (
-            _slider("pitch [deg]", -35.0, 35.0, 0.0),
-            _slider("roll [deg]", -35.0, 35.0, 0.0),
-        )
+        self.pitch = _slider("pitch [deg]", -35.0, 35.0, 0.0)
+        self.roll = _slider("roll [deg]", -35.0, 35.0, 0.0)
         self.message = ipywidgets.HTML()
         self.view = ArmView(layout={"flex": "1 1 420px", "min_width": "320px"})
         self._time = 0.0
@@ -86,8 +84,7 @@ class SteeringExplorer(ipywidgets.VBox):
         turn = Rotation.from_euler("xz", [self.pitch.value, self.roll.value], degrees=True)
         nx, ny, nz = turn.apply([0.0, -1.0, 0.0]).tolist()
         palm = (self.pad.x * half, self.height.value * 1e-3, -self.pad.y * half)
-        thumb, index, middle, ring, pinky = (flag == 1 for flag in FINGER_FLAGS[self.gesture.value])
-        return HandSample(self._time, 1, palm, (nx, ny, nz), (thumb, index, middle, ring, pinky))
+        return HandSample(self._time, 1, palm, (nx, ny, nz), FINGER_FLAGS[self.gesture.value])
 
     def advance(self, duration: float) -> SteeringResult:
         """Hold the hand for some time [s], let the arm follow, draw it, and return the last result."""

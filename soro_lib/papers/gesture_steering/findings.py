@@ -1,18 +1,18 @@
 """Everything the study obtains, by the id of the published number it stands beside."""
 
-from __future__ import annotations
-
 import math
 import time
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from soro_lib.controllers.gesture_steering import GestureSteering, SteeringSettings
 from soro_lib.controllers.gestures import gesture_count
 from soro_lib.controllers.steering_step import step_bound_as_printed
 from soro_lib.papers.gesture_steering.calibration import LOOP_RATE, PAYLOAD, POINTS, ROBOT_MASS, table2_poses
-from soro_lib.papers.gesture_steering.experiments import avoidance, hands, prototype, steering, tables
+from soro_lib.papers.gesture_steering.experiments import avoidance, prototype, steering, tables
+from soro_lib.papers.gesture_steering.recordings import HOVER, load_recording
 from soro_lib.replication.findings import Finding
 from soro_lib.robots import CableDrivenArm
 from soro_lib.sensing.hand_tracking import hand_samples, timing_summary
@@ -24,28 +24,28 @@ def parameter_findings() -> Findings:
     """Return the parameters in use."""
     arm, settings = CableDrivenArm(), SteeringSettings()
     mapping, printed_step = settings.mapping, step_bound_as_printed()
-    return {
-        "s2_installation_angle": Finding(math.acos(arm.coupling_sign)),
-        "s2_cables_per_segment": Finding((len(arm.lower) - 1) / 2),
-        "s2_proximal_passages": Finding(len(arm.lower) - 1),
-        "abstract_length": Finding(2 * arm.segment_length * 1e3),
-        "s3d_gesture_combinations": Finding(
-            gesture_count(), "five fingers with two states each: 2^5 = 32; 120 is 5! (erratum GS-15)"
-        ),
-        "s4a_initial_variance": Finding(settings.palm_filter.initial_variance * 1e6),
-        "s4a_box_size": Finding(2 * mapping.half_width * 1e3),
-        "s4a_box_height": Finding(mapping.lowest * 1e3),
-        "eq4_offset": Finding(mapping.offset * 1e3),
-        "s4b_scale_x": Finding(mapping.scale_x),
-        "s4b_scale_y": Finding(mapping.scale_y),
-        "s4b_scale_z": Finding(mapping.scale_z),
-        "s4b_damping": Finding(settings.weights.damping),
-        "eq26_slide_maximum": Finding(arm.upper[0] * 1e3),
-        "eq26_cable_minimum": Finding(arm.lower[1]),
-        "eq26_bound": Finding(printed_step[1][0]),
-        "eq26_scale_slide": Finding(printed_step[0][0, 0]),
-        "fig13_payload_share": Finding(100 * PAYLOAD / ROBOT_MASS),
+    values = {
+        "s2_installation_angle": math.acos(arm.coupling_sign),
+        "s2_cables_per_segment": (len(arm.lower) - 1) / 2,
+        "s2_proximal_passages": len(arm.lower) - 1,
+        "abstract_length": 2 * arm.segment_length * 1e3,
+        "s4a_initial_variance": settings.palm_filter.initial_variance * 1e6,
+        "s4a_box_size": 2 * mapping.half_width * 1e3,
+        "s4a_box_height": mapping.lowest * 1e3,
+        "eq4_offset": mapping.offset * 1e3,
+        "s4b_scale_x": mapping.scale_x,
+        "s4b_scale_y": mapping.scale_y,
+        "s4b_scale_z": mapping.scale_z,
+        "s4b_damping": settings.weights.damping,
+        "eq26_slide_maximum": arm.upper[0] * 1e3,
+        "eq26_cable_minimum": arm.lower[1],
+        "eq26_bound": printed_step[1][0],
+        "eq26_scale_slide": printed_step[0][0, 0],
+        "fig13_payload_share": 100 * PAYLOAD / ROBOT_MASS,
     }
+    gestures = "five fingers with two states each: 2^5 = 32; 120 is 5! (erratum GS-15)"
+    found = {name: Finding(value) for name, value in values.items()}
+    return found | {"s3d_gesture_combinations": Finding(gesture_count(), gestures)}
 
 
 def table1_findings() -> Findings:
@@ -69,14 +69,15 @@ def table2_findings() -> Findings:
     """Return Table II: errors and norms recomputed, and the model's closest poses."""
     found: Findings = {}
     sign = "sim. minus exp. is positive; the norm is not affected (erratum GS-23)"
-    for row in tables.table2_errors().itertuples():
-        name = f"table2_c{row.configuration}_{row.point}"
+    errors = tables.table2_errors()
+    for row in errors.to_dict("records"):
+        name = f"table2_c{row['configuration']}_{row['point']}"
         for axis in "xyz":
             reason = sign if name + axis == "table2_c2_tipy" else ""
-            found[f"{name}_error_{axis}"] = Finding(getattr(row, f"error_{axis}_mm"), reason)
-        found[f"{name}_norm"] = Finding(float(str(row.norm_mm)))
-    errors = tables.table2_errors()[[f"error_{axis}_mm" for axis in "xyz"]].abs()
-    found["table2_claim_printed"] = Finding(float((errors <= 2.0).all(axis=None)))
+            found[f"{name}_error_{axis}"] = Finding(row[f"error_{axis}_mm"], reason)
+        found[f"{name}_norm"] = Finding(row["norm_mm"])
+    held = (errors[prototype.ERRORS].abs() <= 2.0).all(axis=None)
+    found["table2_claim_printed"] = Finding(float(held))
 
     stretched = (
         "not reproducible as printed: a chord of 51.6 mm in a segment that is 50 mm long and only shortens"
@@ -93,7 +94,7 @@ def table2_findings() -> Findings:
 
 def stream_findings() -> Findings:
     """Return what the shipped recordings say about the tracker, and whether a control step is faster."""
-    table = hands.load_recording("steering_minute")
+    table = load_recording("steering_minute")
     timing = timing_summary(table)
     control, durations = GestureSteering(CableDrivenArm()), []
     for sample in list(hand_samples(table))[:500]:
@@ -112,15 +113,13 @@ def stream_findings() -> Findings:
 def steering_findings(seed: int, seeds: int) -> Findings:
     """Return Figs. 7 and 8 over seeds of the operator's tremor."""
     streams = np.random.SeedSequence(seed).spawn(seeds)
-    paths = [steering.fig7a(np.random.default_rng(stream)) for stream in streams]
-    turns = [steering.fig7b(np.random.default_rng(stream)) for stream in streams]
     edge = "15 deg at 25 mm from the axis is the edge of reach (40 deg less 1 deg per mm); tremor crosses it"
-    found = {
-        "fig7a_position": Finding([_within(table["position_error_mm"], 1.0) for table in paths]),
-        "fig7a_direction": Finding([_within(table["direction_error_deg"], 2.0) for table in paths]),
-        "fig7b_position": Finding([_within(table["position_error_mm"], 1.0) for table in turns], edge),
-        "fig7b_direction": Finding([_within(table["direction_error_deg"], 2.0) for table in turns], edge),
-    }
+    found = {}
+    for figure, experiment, reason in (("fig7a", steering.fig7a, ""), ("fig7b", steering.fig7b, edge)):
+        runs = [experiment(np.random.default_rng(stream)) for stream in streams]
+        for kind, unit, bound in (("position", "mm", 1.0), ("direction", "deg", 2.0)):
+            held = [_within(run[f"{kind}_error_{unit}"], bound) for run in runs]
+            found[f"{figure}_{kind}"] = Finding(held, reason)
     limit = "the turn-rate limit of 2.5 rad/s and the direction filter behind the gesture rule keep it so"
     for panel in steering.FIG8_SCRIPTS:
         tables_ = [steering.fig8(np.random.default_rng(stream), panel) for stream in streams]
@@ -136,12 +135,10 @@ def steering_findings(seed: int, seeds: int) -> Findings:
 def loop_findings(rates: pd.DataFrame) -> Findings:
     """Return Fig. 9 from :func:`soro_lib.papers.gesture_steering.experiments.steering.fig9`."""
     servo = rates[rates["loop"] == "servo bus"]
+    writes = "seven sequential writes at one latency timer of 16 ms each; the bus is not described"
     return {
         "fig9_duration": Finding(servo["time_s"].max()),
-        "fig9_rate": Finding(
-            servo["rate_hz"].mean(),
-            "seven sequential writes at one latency timer of 16 ms each; the bus is not described",
-        ),
+        "fig9_rate": Finding(servo["rate_hz"].mean(), writes),
         "fig9_delay": Finding(1.0 / LOOP_RATE, "one period of the printed 11 Hz"),
     }
 
@@ -169,22 +166,19 @@ def prototype_findings(seed: int, seeds: int, sessions: int, steady: pd.DataFram
             reason = offset if point == "tip" else "median over prototypes; see the distribution"
             found[f"table2_c{configuration}_{point}_prototype"] = Finding(values, reason)
     cause = "cable friction alone moves X by more than 2 mm in half of the force-controlled sessions"
-    found["table2_claim_prototype"] = Finding([prototype.within_claim(run).mean() for run in runs], cause)
-    found["supplement_claim_prototype"] = Finding(
-        [prototype.within_claim(run, 3.0).mean() for run in runs], cause
-    )
+    for claim, bound in (("table2", 2.0), ("supplement", 3.0)):
+        shares = [prototype.within_claim(run, bound).mean() for run in runs]
+        found[f"{claim}_claim_prototype"] = Finding(shares, cause)
     found["table2_tip_better_than_base"] = Finding([_tip_better(run) for run in runs], offset)
     found["table2_depth_resolution"] = Finding(prototype.PrototypeRanges().depth_resolution * 1e3)
-    by_session = steady.groupby("session")[["position_error_mm", "direction_error_deg"]].mean()
     spread = "mean over panels a to d, per session; the ranges of the prototype were fixed before the run"
-    found["fig10_hover"] = Finding(hands.HOVER)
-    found["fig10_position_norm"] = Finding(by_session["position_error_mm"], spread)
-    held = steady.assign(
-        position=steady["position_error_mm"] <= 4.0, direction=steady["direction_error_deg"] <= 5.0
-    )
-    share = held.groupby("session")[["position", "direction"]].mean()
-    found["fig10_position_claim"] = Finding(share["position"], "share of panels a to d, per session")
-    found["fig10_direction_claim"] = Finding(share["direction"], "share of panels a to d, per session")
+    found["fig10_hover"] = Finding(HOVER)
+    error, session = steady["position_error_mm"], steady["session"]
+    found["fig10_position_norm"] = Finding(error.groupby(session).mean(), spread)
+    held = {"position": error <= 4.0, "direction": steady["direction_error_deg"] <= 5.0}
+    for kind, within in held.items():
+        share = within.groupby(session).mean()
+        found[f"fig10_{kind}_claim"] = Finding(share, "share of panels a to d, per session")
     return found
 
 
@@ -208,7 +202,7 @@ def avoidance_findings(summary: pd.DataFrame) -> Findings:
     return found
 
 
-def _within(values: pd.Series | np.ndarray, bound: float) -> float:
+def _within(values: ArrayLike, bound: float) -> float:
     return float(np.max(values) <= bound)
 
 

@@ -11,13 +11,12 @@ import ipywidgets
 import numpy as np
 import pandas as pd
 from IPython.display import Image
-from numpy.typing import NDArray
 
 from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import FLIGHTS, load_flight
 from soro_lib.papers.visual_strain_fusion.experiments.camera_views import FlightViewer, View
 from soro_lib.papers.visual_strain_fusion.experiments.fusion_runs import blind, fuse_flight
 from soro_lib.papers.visual_strain_fusion.figures.camera import annotated, explorer_plots, fig06a_views
-from soro_lib.papers.visual_strain_fusion.world.motion import glue_fibre
+from soro_lib.papers.visual_strain_fusion.world.motion import glued_shifts
 from soro_lib.papers.visual_strain_fusion.world.scene import ViewConditions
 from soro_lib.replication import as_image
 from soro_lib.replication.frontend import is_live
@@ -55,9 +54,8 @@ class FusionExplorer(ipywidgets.VBox):
 
     def __init__(self, seed: int = 1) -> None:
         self._seed = seed
-        self.flight = ipywidgets.Dropdown(
-            options=list(FLIGHTS), value="scene1_obstacles", description="flight"
-        )
+        names = list(FLIGHTS)
+        self.flight = ipywidgets.Dropdown(options=names, value="scene1_obstacles", description="flight")
         self.time = _slider("time [s]", 0.0, 199.95, 105.0, 0.05)
         self.switch = ipywidgets.ToggleButtons(options=list(SWITCHES))
         self.start = _slider("from [s]", 0.0, 195.0, 60.0, 0.5)
@@ -89,10 +87,8 @@ class FusionExplorer(ipywidgets.VBox):
         view = self.view()
         _, coded = cv2.imencode(".jpg", annotated(view.image, view.frame))
         self.picture.value = coded.tobytes()
-        motion = self._viewer.motion
-        self.plots.value = as_image(
-            explorer_plots(self.run, self._shifts, self._step, motion.pose[:, :3])
-        ).data
+        truth = self._viewer.motion.pose[:, :3]
+        self.plots.value = as_image(explorer_plots(self.run, self._shifts, self._step, truth)).data
         self.message.value = describe(view, self.run.iloc[self._step])
 
     @property
@@ -119,24 +115,16 @@ class FusionExplorer(ipywidgets.VBox):
         if SWITCHES[self.switch.value] is not None:
             frames = blind(frames, self.start.value, self.duration.value)
         self.run = fuse_flight(frames, self._viewer.motion, np.random.default_rng(self._seed))
-        self._shifts = fibre_shifts(self._viewer, self._seed)
+        # The same draws as those of the run.
+        self._shifts = glued_shifts(self._viewer.motion, np.random.default_rng(self._seed))
         self.draw()
-
-
-def fibre_shifts(viewer: FlightViewer, seed: int) -> NDArray[np.float64]:
-    """Return the wavelength shifts (n, gratings) [m] that :func:`fuse_flight` draws from this seed."""
-    rng = np.random.default_rng(seed)
-    return glue_fibre(rng).shift(viewer.motion.configuration, viewer.motion.elongations, rng)
 
 
 def describe(view: View, moment: pd.Series) -> str:
     """Return a line of text about a moment: what the tracker found, and the errors of the three estimates."""
-    found = f"{view.frame.inliers} of {view.frame.features} features fit" if view.frame.tracked else "lost"
-    errors = ", ".join(
-        f"{label} {moment[f'{name}_mm']:.2f} mm"
-        for name, label in (("camera", "camera"), ("fibre", "fibre"), ("fused", "fusion"))
-    )
-    return f"{found}; errors: {errors}; weight of the fibre {moment['weight']:.2f}"
+    names = {"camera": "camera", "fibre": "fibre", "fused": "fusion"}
+    errors = ", ".join(f"{label} {moment[f'{name}_mm']:.2f} mm" for name, label in names.items())
+    return f"{view.found}; errors: {errors}; weight of the fibre {moment['weight']:.2f}"
 
 
 def explore() -> FusionExplorer | Image:

@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import MutableMapping, Sequence
 from multiprocessing import Manager, Pool
 from pathlib import Path
 from typing import Any
@@ -16,13 +16,7 @@ from typing import Any
 import numpy as np
 from rich.progress import Progress
 
-from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import (
-    COLUMNS,
-    FLIGHTS,
-    MAP_ARRAYS,
-    SLUG,
-    fly,
-)
+from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import COLUMNS, FLIGHTS, MAP_ARRAYS, fly
 from soro_lib.project import data_directory
 from soro_lib.replication.datacards import generator_options, read_card, write_card
 
@@ -31,7 +25,7 @@ STEPS, SMALL_STEPS = 4000, 40
 GENERATOR = "soro_lib.papers.visual_strain_fusion.recordings"
 
 
-def record(name: str, directory: Path, progress: Any = None, steps: int = STEPS) -> list[Path]:
+def record(name: str, directory: Path, progress: MutableMapping[str, int], steps: int = STEPS) -> list[Path]:
     """Fly once and write frames and map, each with its card.
 
     Parameters
@@ -40,7 +34,7 @@ def record(name: str, directory: Path, progress: Any = None, steps: int = STEPS)
         One of :data:`~soro_lib.papers.visual_strain_fusion.experiments.camera_runs.FLIGHTS`.
     directory : Path
         Where to.
-    progress : mutable mapping, optional
+    progress : mutable mapping
         ``progress[name]`` counts the frames.
     steps : int, optional
         Frames of the run.
@@ -50,38 +44,21 @@ def record(name: str, directory: Path, progress: Any = None, steps: int = STEPS)
     list of Path
         The two files.
     """
-
-    def report(frames: int) -> None:
-        if progress is not None:
-            progress[name] = frames
-
     flight = FLIGHTS[name]
-    frames, point_map = fly(flight, SEED, steps, report)
+    frames, point_map = fly(flight, SEED, steps, lambda done: progress.update({name: done}))
     table, points = directory / f"{name}.csv.gz", directory / f"{name}_map.npz"
     unfinished = table.with_suffix(".part"), points.with_suffix(".part.npz")
-    compression = {"method": "gzip", "compresslevel": 9, "mtime": 0}
-    frames.to_csv(
-        unfinished[0], index=False, float_format="%.5f", lineterminator="\n", compression=compression
-    )
+    form: dict[str, Any] = {"float_format": "%.5f", "lineterminator": "\n", "index": False}
+    frames.to_csv(unfinished[0], compression={"method": "gzip", "compresslevel": 9, "mtime": 0}, **form)
     np.savez_compressed(unfinished[1], allow_pickle=False, **point_map)
     os.replace(unfinished[0], table)
     os.replace(unfinished[1], points)
     where = f"scene {flight.scene}, {flight.disturbance}"
     told = "Told: the similarity of Eq. (30), from a sweep before the run; nothing else but images."
-    write_card(
-        table,
-        description=f"Camera poses per rendered frame, {where}. {told}",
-        columns=COLUMNS,
-        generator=GENERATOR,
-        seed=SEED,
-    )
-    write_card(
-        points,
-        description=f"Map of the tracker after the run, {where}; depth by triangulation between keyframes.",
-        columns=MAP_ARRAYS,
-        generator=GENERATOR,
-        seed=SEED,
-    )
+    poses = f"Camera poses per rendered frame, {where}. {told}"
+    depth = f"Map of the tracker after the run, {where}; depth by triangulation between keyframes."
+    write_card(table, description=poses, columns=COLUMNS, generator=GENERATOR, seed=SEED)
+    write_card(points, description=depth, columns=MAP_ARRAYS, generator=GENERATOR, seed=SEED)
     return [table, points]
 
 
@@ -105,14 +82,15 @@ def _record_all(names: Sequence[str], directory: Path, jobs: int, steps: int) ->
 
 def main(arguments: list[str] | None = None) -> int:
     """Record all flights, show the progress and say which files changed."""
-    parser = generator_options("Render and track the camera flights again.", data_directory(SLUG))
+    folder = data_directory("visual_strain_fusion")
+    parser = generator_options("Render and track the camera flights again.", folder)
     parser.add_argument("--jobs", type=int, default=min(len(FLIGHTS), os.cpu_count() or 1))
     parser.add_argument("--only", choices=list(FLIGHTS), help="record one flight only")
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
     names = [options.only] if options.only else list(FLIGHTS)[:: 5 if options.small else 1]
+    steps = SMALL_STEPS if options.small else STEPS
     try:
-        steps = SMALL_STEPS if options.small else STEPS
         written = _record_all(names, options.output, options.jobs, steps)
     except KeyboardInterrupt:
         for unfinished in options.output.glob("*.part*"):

@@ -1,6 +1,4 @@
-"""The experiments of Lai et al., Gesture-based Steering Framework For Redundant Soft Robots.
+"""What the paper did, one module per group of figures, each experiment a function that returns a table.
 
-``hands``: recordings and filters (Fig. 5); ``tables``: Tables I and II; ``steering``: Figs. 6 to 9;
-``prototype``: Figs. 10, 11 and the errors of Table II; ``avoidance``: Fig. 14; ``beyond``: what the paper
-leaves open; ``results``: all of it as findings for the scorecard.
+No drawing here, no numbers of the paper: those are in ``figures`` and ``findings``.
 """

@@ -1,34 +1,15 @@
 """The simulated prototype: errors of Table II and Figs. 10, 11 of Lai et al., over many sessions."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from soro_lib.controllers.gesture_steering import SteeringSettings
 from soro_lib.papers.gesture_steering.calibration import POINTS, printed_positions, table2_poses
-from soro_lib.papers.gesture_steering.experiments.hands import HOVER, hover_recording
-from soro_lib.papers.gesture_steering.experiments.steering import (
-    CONTROL_PERIOD,
-    LEAD,
-    commanding_hand,
-    result_table,
-    steered,
-)
-from soro_lib.papers.gesture_steering.world.hand import HandNoise
-from soro_lib.papers.gesture_steering.world.plant import (
-    Prototype,
-    PrototypeRanges,
-    drawn_prototype,
-    pointing_angle,
-)
+from soro_lib.papers.gesture_steering.experiments import steering
+from soro_lib.papers.gesture_steering.recordings import HOVER, hover_recording
+from soro_lib.papers.gesture_steering.world import plant
+from soro_lib.papers.gesture_steering.world.plant import Array, Prototype, PrototypeRanges, drawn_prototype
 from soro_lib.robots import CableDrivenArm
 from soro_lib.robots.cable_driven_kernels import compiled_kinematics
-
-Array = NDArray[np.float64]
 
 MARKER_DISTANCE = 0.020
 """Distance of the blue marker from the tip [m]; not printed, ours."""
@@ -42,6 +23,8 @@ CAUSES: dict[str, tuple[str, ...]] = {
     "camera": ("camera_sd", "depth_resolution"),
 }
 """The stated causes of error and the ranges that they stand for."""
+ERRORS = [f"error_{axis}_mm" for axis in "xyz"]
+"""Columns of the errors per axis."""
 
 
 def experiment_error(simulated: Array, measured: Array) -> Array:
@@ -92,18 +75,18 @@ def table2_sessions(
     index = pd.MultiIndex.from_product(
         [range(sessions), range(4), POINTS], names=["session", "configuration", "point"]
     )
-    table = pd.DataFrame(
-        errors.reshape(-1, 3) * 1e3, index=index, columns=[f"error_{axis}_mm" for axis in "xyz"]
-    )
-    table["norm_mm"] = np.linalg.norm(table.to_numpy(), axis=1)
-    return table.reset_index()
+    table = pd.DataFrame(errors.reshape(-1, 3) * 1e3, index=index, columns=ERRORS)
+    return table.assign(norm_mm=np.linalg.norm(table, axis=1)).reset_index()
 
 
 def within_claim(sessions: pd.DataFrame, bound_mm: float = 2.0) -> Array:
     """Return, per session, whether every axis of every point is within the bound: 0 or 1."""
-    axes = sessions[[f"error_{axis}_mm" for axis in "xyz"]].abs().max(axis=1)
-    held = axes.groupby(sessions["session"]).max() <= bound_mm
-    return np.asarray(held, dtype=np.float64)
+    return np.asarray(largest_errors(sessions).max(axis=1) <= bound_mm, dtype=np.float64)
+
+
+def largest_errors(sessions: pd.DataFrame) -> pd.DataFrame:
+    """Return, per session, the largest error of all points along each axis [mm]."""
+    return sessions[ERRORS].abs().groupby(sessions["session"]).max()
 
 
 def printed_percentiles(sessions: pd.DataFrame) -> pd.DataFrame:
@@ -140,16 +123,11 @@ def cause_study(seed: np.random.SeedSequence, sessions: int = 400) -> pd.DataFra
             ranges = PrototypeRanges() if names is None else PrototypeRanges().only(*names)
             rng = np.random.default_rng(seed)
             table = table2_sessions(rng, sessions, ranges, by_length=control == "length")
-            largest = (
-                table[[f"error_{axis}_mm" for axis in "xyz"]].abs().groupby(table["session"]).max().median()
-            )
-            rows.append((control, cause, within_claim(table).mean(), *largest))
+            rows.append((control, cause, within_claim(table).mean(), *largest_errors(table).median()))
     return pd.DataFrame(rows, columns=["control", "cause", "claim", "x_mm", "y_mm", "z_mm"])
 
 
-def followed(
-    prototype: Prototype, commands: pd.DataFrame, rng: np.random.Generator, by_length: bool = False
-) -> pd.DataFrame:
+def followed(prototype: Prototype, commands: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
     """Let prototypes follow the commands of a steering session and measure them; Lai et al., Eq. (28).
 
     Parameters
@@ -160,8 +138,6 @@ def followed(
         From :func:`soro_lib.papers.gesture_steering.experiments.steering.result_table`.
     rng : Generator
         Camera noise.
-    by_length : bool
-        As in :func:`table2_sessions`.
 
     Returns
     -------
@@ -169,24 +145,19 @@ def followed(
         Per session and time: ``session``, ``time_s``, ``sim_*_mm``, ``mea_*_mm``, ``position_error_mm``,
         ``direction_error_deg``.
     """
-    actuations = commands[["slide_mm", *(f"cable_{index}" for index in range(1, 7))]].to_numpy() * [
-        1e-3,
-        *[1.0] * 6,
-    ]
-    kinematics = compiled_kinematics(prototype.arm)
-    branch = _branches(actuations)
+    actuations, kinematics = steering.actuations(commands), compiled_kinematics(prototype.arm)
     frames = []
-    for time, actuation, sign in zip(commands["time_s"], actuations, branch):
-        points, direction = prototype.points(actuation, by_length, sign)
+    for time, actuation, sign in zip(commands["time_s"], actuations, _branches(actuations)):
+        points, direction = prototype.points(actuation, branch=sign)
         tip, marker = points[:, 2], points[:, 2] + MARKER_DISTANCE * direction
         seen_tip, seen_marker = prototype.measured(np.stack([tip, marker], axis=1), rng).transpose(1, 0, 2)
         model = kinematics(actuation)
-        ideal = pointing_angle(model.tip, model.tip + MARKER_DISTANCE * model.direction)
+        ideal = plant.pointing_angle(model.tip, model.tip + MARKER_DISTANCE * model.direction)
         frame = {"session": np.arange(prototype.sessions), "time_s": time}
         frame |= {f"sim_{axis}_mm": 1e3 * value for axis, value in zip("xyz", model.tip)}
         frame |= {f"mea_{axis}_mm": values for axis, values in zip("xyz", 1e3 * seen_tip.T)}
         frame["position_error_mm"] = 1e3 * experiment_error(model.tip, seen_tip)
-        frame["direction_error_deg"] = np.degrees(np.abs(ideal - pointing_angle(seen_tip, seen_marker)))
+        frame["direction_error_deg"] = np.degrees(np.abs(ideal - plant.pointing_angle(seen_tip, seen_marker)))
         frames.append(pd.DataFrame(frame))
     return pd.concat(frames, ignore_index=True)
 
@@ -202,20 +173,13 @@ def fig10_commands(seed: int = 1) -> dict[str, pd.DataFrame]:
 
     (a) palm hovering, (b) V-sign hovering, (c) a slanted circle, (d) an arc with the tip turning.
     """
-    streams = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3)]
-    settings = SteeringSettings()
-    hover = result_table(steered(hover_recording(streams[0]), settings, interval=CONTROL_PERIOD))
-    hover["time_s"] -= hover["time_s"].iloc[0]
+    streams = np.random.default_rng(seed).spawn(3)
+    steps = steering.steered(hover_recording(streams[0]), interval=steering.CONTROL_PERIOD)
+    hover = steering.result_table(steps)
     panels = {"a": hover.query("time_s < @HOVER").copy(), "b": hover.query("time_s >= @HOVER").copy()}
     panels["b"]["time_s"] -= HOVER
-    for panel, path, direction, stream in (
-        ("c", _slanted_circle, _leaning_in, streams[1]),
-        ("d", _rising_arc, _swaying, streams[2]),
-    ):
-        table = commanding_hand(stream, 12.0, path, direction, noise=HandNoise())
-        panels[panel] = result_table(steered(table, settings, interval=CONTROL_PERIOD), LEAD).query(
-            "time_s >= 0"
-        )
+    panels["c"] = steering.steered_by_hand(streams[1], 12.0, _slanted_circle, _leaning_in)
+    panels["d"] = steering.steered_by_hand(streams[2], 12.0, _rising_arc, _swaying)
     return panels
 
 
@@ -227,33 +191,24 @@ def fig10(
     Returns
     -------
     DataFrame
-        As :func:`followed`, with ``panel`` and ``mode``.
+        As :func:`followed`, with ``panel``.
     """
     prototype = drawn_prototype(CableDrivenArm(), rng, sessions)
-    tables = [
-        followed(prototype, table.iloc[::every], rng).assign(panel=panel) for panel, table in commands.items()
-    ]
-    return pd.concat(tables, ignore_index=True)
+    tables = {panel: followed(prototype, table.iloc[::every], rng) for panel, table in commands.items()}
+    return pd.concat(tables, names=["panel"]).reset_index("panel").reset_index(drop=True)
 
 
-def steady_state(measured: pd.DataFrame, settle: float = 2.0) -> pd.DataFrame:
-    """Return the mean errors per panel and session after the first ``settle`` seconds."""
-    late = measured[measured["time_s"] >= settle]
-    return (
-        late.groupby(["panel", "session"])[["position_error_mm", "direction_error_deg"]].mean().reset_index()
-    )
+def steady_state(measured: pd.DataFrame) -> pd.DataFrame:
+    """Return the mean errors per panel and session after the first two seconds."""
+    late = measured[measured["time_s"] >= 2.0].groupby(["panel", "session"])
+    return late[["position_error_mm", "direction_error_deg"]].mean().reset_index()
 
 
-def tip_scatter(
-    actuations: Sequence[Array], rng: np.random.Generator, sessions: int = 300
-) -> list[tuple[Array, Array]]:
-    """Return mean (3,) [m] and covariance (3, 3) [m^2] of the true tip, per actuation (7,)."""
+def tip_scatter(actuations: Array, rng: np.random.Generator, sessions: int) -> list[tuple[Array, Array]]:
+    """Return mean (3,) [m] and covariance (3, 3) [m^2] of the true tip, per row of actuations (n, 7)."""
     prototype = drawn_prototype(CableDrivenArm(), rng, sessions)
-    found = []
-    for actuation in actuations:
-        tips = prototype.points(actuation)[0][:, 2]
-        found.append((tips.mean(axis=0), np.cov(tips.T)))
-    return found
+    tips = [prototype.points(actuation)[0][:, 2] for actuation in actuations]
+    return [(tip.mean(axis=0), np.cov(tip.T)) for tip in tips]
 
 
 def _slanted_circle(time: Array) -> Array:

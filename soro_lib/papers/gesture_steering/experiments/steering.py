@@ -1,24 +1,21 @@
 """Steering in simulation: poses, paths, gesture changes and loop rate (Lai et al., Figs. 6 to 9)."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from soro_lib.controllers.gesture_steering import GestureSteering, SteeringResult, SteeringSettings, replay
 from soro_lib.controllers.hand_mapping import PalmMapping
-from soro_lib.papers.gesture_steering.experiments.hands import steering_recording
-from soro_lib.papers.gesture_steering.world.hand import FINGER_FLAGS, HandNoise, synthetic_recording
+from soro_lib.papers.gesture_steering.recordings import steering_recording
+from soro_lib.papers.gesture_steering.world import hand
+from soro_lib.papers.gesture_steering.world.hand import FINGER_FLAGS, Array, HandNoise, Path, constant
 from soro_lib.robots import CableDrivenArm
 from soro_lib.sensing.hand_tracking import HandSample, hand_samples
-
-Array = NDArray[np.float64]
-Path = Callable[[Array], Array]
 
 LEAD = 2.0
 """Time that a simulated operator waits at the start of a path, and that is not evaluated [s]."""
@@ -28,6 +25,9 @@ HIGH_REACH = PalmMapping(offset=0.165)
 """The device 75 mm lower, all scales as printed. With the printed offset the 140 mm of Fig. 7(b) need a palm
 50 mm above
 the device, which is outside the allowed box (erratum GS-6)."""
+ACTUATION = ["slide_mm", *(f"cable_{index}" for index in range(1, 7))]
+ACTUATION_UNITS = np.array([1e3, *[1.0] * 6])
+"""Columns of a table of results that hold the actuation, and what it is multiplied by to fill them."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def commanding_hand(
         return _turns((0.0, -1.0, 0.0), normals)
 
     script = [(start + LEAD if start > 0 else 0.0, name) for start, name in gestures]
-    return synthetic_recording(rng, duration + LEAD, palm, tilt, script, noise)
+    return hand.synthetic_recording(rng, duration + LEAD, palm, tilt, script, noise)
 
 
 def at_interval(samples: Iterable[HandSample], interval: float) -> list[HandSample]:
@@ -107,14 +107,11 @@ def at_interval(samples: Iterable[HandSample], interval: float) -> list[HandSamp
 
 
 def steered(
-    table: pd.DataFrame,
-    settings: SteeringSettings | None = None,
-    arm: CableDrivenArm | None = None,
-    interval: float = 0.0,
+    table: pd.DataFrame, settings: SteeringSettings | None = None, interval: float = 0.0
 ) -> list[SteeringResult]:
     """Replay a recording through the controller, at the sensor's rate or at the given interval [s]."""
     samples = at_interval(hand_samples(table), interval) if interval else list(hand_samples(table))
-    return replay(GestureSteering(arm or CableDrivenArm(), settings), samples)
+    return replay(GestureSteering(CableDrivenArm(), settings), samples)
 
 
 def result_table(results: Sequence[SteeringResult], lead: float = 0.0) -> pd.DataFrame:
@@ -135,33 +132,30 @@ def result_table(results: Sequence[SteeringResult], lead: float = 0.0) -> pd.Dat
         ``position_error_mm``, ``direction_error_deg``; ``mode``, ``reason``; ``slide_mm`` and ``cable_1`` to
         ``cable_6`` (-N).
     """
-    time = np.array([result.time for result in results])
-    columns: dict[str, ArrayLike] = {"time_s": time - time[0] - lead}
-    for name, rows in (
-        ("tip", [result.tip for result in results]),
-        ("mid", [result.mid for result in results]),
-        ("target", [result.target_position for result in results]),
-        ("goal", [result.goal.position for result in results]),
-    ):
-        columns |= {f"{name}_{axis}_mm": values for axis, values in zip("xyz", np.array(rows).T * 1e3)}
-    for name, rows in (
-        ("", [result.direction for result in results]),
-        ("target_", [result.target_direction for result in results]),
-        ("goal_", [result.goal.direction for result in results]),
-    ):
-        x, y, z = np.array(rows).T
-        columns |= {
-            f"{name}alpha_deg": np.degrees(np.arctan2(x, z)),
-            f"{name}gamma_deg": np.degrees(np.arctan2(y, z)),
-        }
-    columns["position_error_mm"] = [1e3 * result.position_error for result in results]
-    columns["direction_error_deg"] = [np.degrees(result.direction_error) for result in results]
+
+    def series(attribute: str) -> Array:
+        return np.array([attrgetter(attribute)(result) for result in results])
+
+    columns: dict[str, ArrayLike] = {"time_s": series("time") - results[0].time - lead}
+    positions = {"tip": "tip", "mid": "mid", "target": "target_position", "goal": "goal.position"}
+    for name, attribute in positions.items():
+        columns |= {f"{name}_{axis}_mm": values for axis, values in zip("xyz", series(attribute).T * 1e3)}
+    directions = {"": "direction", "target_": "target_direction", "goal_": "goal.direction"}
+    for name, attribute in directions.items():
+        x, y, z = series(attribute).T
+        columns[f"{name}alpha_deg"] = np.degrees(np.arctan2(x, z))
+        columns[f"{name}gamma_deg"] = np.degrees(np.arctan2(y, z))
+    columns["position_error_mm"] = 1e3 * series("position_error")
+    columns["direction_error_deg"] = np.degrees(series("direction_error"))
     columns["mode"] = [result.mode.value for result in results]
     columns["reason"] = [result.reason for result in results]
-    actuation = np.array([result.actuation for result in results])
-    columns["slide_mm"] = actuation[:, 0] * 1e3
-    columns |= {f"cable_{index}": values for index, values in enumerate(actuation[:, 1:].T, start=1)}
+    columns |= zip(ACTUATION, (series("actuation") * ACTUATION_UNITS).T)
     return pd.DataFrame(columns)
+
+
+def actuations(table: pd.DataFrame) -> Array:
+    """Return the actuations (n, 7) of a table of results: slide [m] and cables."""
+    return table[ACTUATION].to_numpy() / ACTUATION_UNITS
 
 
 # --- Fig. 6 ------------------------------------------------------------------------------------------------
@@ -183,67 +177,66 @@ def fig6_poses() -> list[tuple[str, SteeringResult]]:
     poses = []
     for index, (name, gesture, palm, tilt) in enumerate(FIG6_HANDS):
         x, y, z = Rotation.from_rotvec(tilt).apply([0.0, -1.0, 0.0]).tolist()
-        fingers = tuple(flag == 1 for flag in FINGER_FLAGS[gesture])
         times = 3.0 * index + np.arange(1, 301) * 0.01
-        for time in times.tolist():
-            result = steering.update(HandSample(time, 1, palm, (x, y, z), fingers))  # type: ignore[arg-type]
-        poses.append((name, result))
+        frames = [HandSample(time, 1, palm, (x, y, z), FINGER_FLAGS[gesture]) for time in times.tolist()]
+        poses.append((name, replay(steering, frames)[-1]))
     return poses
 
 
 # --- Fig. 7 ------------------------------------------------------------------------------------------------
 
 
-def infinity_path(time: Array, amplitude: float = 0.025, height: float = 0.120, period: float = 8.0) -> Array:
+def infinity_path(time: Array) -> Array:
     """Return the figure-eight of Fig. 7(a): positions (n, 3) [m]; amplitude and period are ours."""
-    phase = 2 * np.pi * np.asarray(time) / period
-    return np.column_stack(
-        [amplitude * np.sin(phase), amplitude * np.sin(phase) * np.cos(phase), np.full_like(phase, height)]
-    )
+    phase = 2 * np.pi * np.asarray(time) / 8.0
+    x = 0.025 * np.sin(phase)
+    return np.column_stack([x, x * np.cos(phase), np.full_like(phase, 0.120)])
 
 
-def cone(time: Array, opening: float, period: float = 8.0) -> Array:
-    """Return directions (n, 3) that go round e_z at ``opening`` [rad], opened over the first second."""
-    time = np.asarray(time, dtype=float)
-    phase = 2 * np.pi * time / period
-    tilt = opening * np.clip(time, 0.0, 1.0)
-    return np.column_stack([np.sin(tilt) * np.cos(phase), np.sin(tilt) * np.sin(phase), np.cos(tilt)])
+def pointing(tilt: Array, azimuth: Array) -> Array:
+    """Return unit directions (n, 3) that lean from e_z toward an azimuth [rad]."""
+    return np.column_stack([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)])
 
 
-def straight(time: Array) -> Array:
-    """Return e_z for every time: a palm held flat."""
-    return np.tile([0.0, 0.0, 1.0], (len(time), 1))
+straight = constant(0.0, 0.0, 1.0)
+"""The direction e_z at every time: a palm held flat."""
 
 
-def fig7a(
+def steered_by_hand(
     rng: np.random.Generator,
+    duration: float,
+    position: Path,
+    direction: Path,
+    gestures: Sequence[tuple[float, str]] = ((0.0, "palm"),),
     settings: SteeringSettings | None = None,
-    interval: float = CONTROL_PERIOD,
     noise: HandNoise | None = None,
-    duration: float = 16.0,
+    interval: float = CONTROL_PERIOD,
 ) -> pd.DataFrame:
-    """Steer the tip along the infinity path with a flat palm; evaluated from time 0 on."""
-    table = commanding_hand(rng, duration, infinity_path, straight, noise=noise)
+    """Steer with a commanding hand; results from time 0 on. Arguments as of `commanding_hand`, `steered`."""
+    settings = settings or SteeringSettings()
+    table = commanding_hand(rng, duration, position, direction, gestures, settings.mapping, noise)
     return result_table(steered(table, settings, interval=interval), LEAD).query("time_s >= 0")
+
+
+def fig7a(rng: np.random.Generator, interval: float = CONTROL_PERIOD, duration: float = 16.0) -> pd.DataFrame:
+    """Steer the tip along the infinity path with a flat palm; evaluated from time 0 on."""
+    return steered_by_hand(rng, duration, infinity_path, straight, interval=interval)
 
 
 def fig7b(
     rng: np.random.Generator,
-    settings: SteeringSettings | None = None,
-    interval: float = CONTROL_PERIOD,
     noise: HandNoise | None = None,
     opening: float = np.deg2rad(15.0),
     duration: float = 16.0,
 ) -> pd.DataFrame:
-    """Turn the tip about the fixed point (-15, -20, 140) mm."""
-    settings = replace(settings or SteeringSettings(), mapping=HIGH_REACH)
-    table = commanding_hand(
-        rng, duration,
-        lambda time: np.tile([-0.015, -0.020, 0.140], (len(time), 1)),
-        lambda time: cone(time, opening),
-        mapping=HIGH_REACH, noise=noise,
-    )  # fmt: skip
-    return result_table(steered(table, settings, interval=interval), LEAD).query("time_s >= 0")
+    """Turn the tip about the fixed point (-15, -20, 140) mm; the cone opens over the first second."""
+
+    def cone(time: Array) -> Array:
+        return pointing(opening * np.clip(time, 0.0, 1.0), 2 * np.pi * time / 8.0)
+
+    settings = SteeringSettings(mapping=HIGH_REACH)
+    point = constant(-0.015, -0.020, 0.140)
+    return steered_by_hand(rng, duration, point, cone, settings=settings, noise=noise)
 
 
 # --- Fig. 8 ------------------------------------------------------------------------------------------------
@@ -257,34 +250,30 @@ FIG8_SCRIPTS = {
 """Gestures of the four panels of Fig. 8: start [s], name."""
 
 
-def fig8(rng: np.random.Generator, panel: str, settings: SteeringSettings | None = None,
-         interval: float = CONTROL_PERIOD, noise: HandNoise | None = None) -> pd.DataFrame:  # fmt: skip
+def fig8(rng: np.random.Generator, panel: str, settings: SteeringSettings | None = None) -> pd.DataFrame:
     """Change gestures with a hand that never stops turning (tilt 7 to 23 degrees)."""
 
     def direction(time: Array) -> Array:
-        tilt, azimuth = np.deg2rad(15.0 + 8.0 * np.sin(2 * np.pi * time / 5.0)), 2 * np.pi * time / 6.0
-        return np.column_stack([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)])
+        tilt = np.deg2rad(15.0 + 8.0 * np.sin(2 * np.pi * time / 5.0))
+        return pointing(tilt, 2 * np.pi * time / 6.0)
 
-    def position(time: Array) -> Array:
-        return np.tile([0.010, -0.008, 0.115], (len(time), 1))
-
-    table = commanding_hand(rng, 12.0, position, direction, FIG8_SCRIPTS[panel], noise=noise)
-    return result_table(steered(table, settings, interval=interval), LEAD).query("time_s >= 0")
+    position = constant(0.010, -0.008, 0.115)
+    return steered_by_hand(rng, 12.0, position, direction, FIG8_SCRIPTS[panel], settings)
 
 
-def direction_steps(table: pd.DataFrame, per: float = CONTROL_PERIOD) -> Array:
-    """Return the turn of the tip between frames, scaled to ``per`` [s]: (n - 1,) [deg]."""
+def direction_steps(table: pd.DataFrame) -> Array:
+    """Return the turn of the tip between frames, scaled to the control period: (n - 1,) [deg]."""
     alpha, gamma = np.tan(np.deg2rad(table["alpha_deg"])), np.tan(np.deg2rad(table["gamma_deg"]))
     direction = np.column_stack([alpha, gamma, np.ones(len(table))])
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     cosine = np.sum(direction[1:] * direction[:-1], axis=1)
-    return np.degrees(np.arccos(np.clip(cosine, -1, 1))) * per / np.diff(table["time_s"])
+    return np.degrees(np.arccos(np.clip(cosine, -1, 1))) * CONTROL_PERIOD / np.diff(table["time_s"])
 
 
 # --- Fig. 9 ------------------------------------------------------------------------------------------------
 
 
-def fig9(rng: np.random.Generator, duration: float = 130.0, bus: ServoBus | None = None) -> pd.DataFrame:
+def fig9(rng: np.random.Generator) -> pd.DataFrame:
     """Steer at random and note the rate of the loop, without and with the servo bus.
 
     The rate is simulated, not timed: a loop takes the newest frame, computes, and, with servos, waits for the
@@ -295,8 +284,8 @@ def fig9(rng: np.random.Generator, duration: float = 130.0, bus: ServoBus | None
     DataFrame
         ``loop`` ("no servos", "servo bus"), ``time_s``, ``rate_hz``.
     """
-    bus = bus or ServoBus()
-    stamps = steering_recording(rng, duration)["timestamp_us"].to_numpy() * 1e-6
+    bus = ServoBus()
+    stamps = steering_recording(rng, 130.0)["timestamp_us"].to_numpy() * 1e-6
     stamps = stamps - stamps[0]
     tables = []
     for name, busy in (("no servos", bus.computation), ("servo bus", bus.period)):
@@ -319,12 +308,11 @@ def loop_starts(stamps: Array, busy: float) -> Array:
     free, seen = 0.0, -1
     while True:
         newest = int(np.searchsorted(stamps, free, side="right")) - 1
-        frame = max(newest, seen + 1)
-        if frame >= len(stamps):
+        seen = max(newest, seen + 1)
+        if seen >= len(stamps):
             return np.array(starts)
-        start = max(free, float(stamps[frame]))
-        starts.append(start)
-        seen, free = frame, start + busy
+        starts.append(max(free, float(stamps[seen])))
+        free = starts[-1] + busy
 
 
 # --- helpers -----------------------------------------------------------------------------------------------

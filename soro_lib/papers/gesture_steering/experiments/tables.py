@@ -1,21 +1,18 @@
 """Tables I and II of Lai et al., recomputed from what they rest on."""
 
-from __future__ import annotations
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from soro_lib.papers.gesture_steering.calibration import POINTS, printed_positions, table2_poses
 from soro_lib.robots import CableDrivenArm
-
-Array = NDArray[np.float64]
 
 COMPRESSED_LENGTH = 0.045
 """Length [m] at which K_T reaches the upper end of Table I."""
 
 
-def table1(arm: CableDrivenArm | None = None) -> pd.DataFrame:
+def table1() -> pd.DataFrame:
     """Derive the stiffnesses of Table I from modulus and cross-section.
 
     Returns
@@ -23,7 +20,7 @@ def table1(arm: CableDrivenArm | None = None) -> pd.DataFrame:
     DataFrame
         ``quantity``, ``unit``, ``unloaded`` (50 mm), ``compressed`` (45 mm).
     """
-    arm = arm or CableDrivenArm()
+    arm = CableDrivenArm()
     long, short = arm.segment_length, COMPRESSED_LENGTH
     rows = [
         ("E", "MPa", arm.young_modulus * 1e-6, arm.young_modulus * 1e-6),
@@ -46,14 +43,10 @@ def table2_errors() -> pd.DataFrame:
     """
     error = (printed_positions("sim") - printed_positions("exp")) * 1e3
     relative = error - error[:, :1]
-    rows = [
-        (configuration, point, *error[configuration, index], np.linalg.norm(error[configuration, index]),
-         *relative[configuration, index])
-        for configuration in range(4)
-        for index, point in enumerate(POINTS)
-    ]  # fmt: skip
+    index = pd.MultiIndex.from_product([range(4), POINTS], names=["configuration", "point"])
+    values = np.concatenate([error, np.linalg.norm(error, axis=-1, keepdims=True), relative], axis=-1)
     columns = [*(f"error_{axis}_mm" for axis in "xyz"), "norm_mm", *(f"relative_{axis}_mm" for axis in "xyz")]
-    return pd.DataFrame(rows, columns=["configuration", "point", *columns])
+    return pd.DataFrame(values.reshape(12, 7), index, columns).reset_index()
 
 
 def segment_chords() -> pd.DataFrame:
@@ -68,19 +61,15 @@ def segment_chords() -> pd.DataFrame:
     DataFrame
         ``configuration``, ``segment``, ``sim_chord_mm``, ``exp_chord_mm``.
     """
-    rows = []
-    for configuration in range(4):
-        for index, segment in enumerate(("proximal", "distal")):
-            chords = [
-                np.linalg.norm(np.diff(printed_positions(kind)[configuration, index : index + 2], axis=0))
-                * 1e3
-                for kind in ("sim", "exp")
-            ]
-            rows.append((configuration, segment, *chords))
-    return pd.DataFrame(rows, columns=["configuration", "segment", "sim_chord_mm", "exp_chord_mm"])
+    index = pd.MultiIndex.from_product([range(4), ("proximal", "distal")], names=["configuration", "segment"])
+    chords = {}
+    for kind in ("sim", "exp"):
+        between = np.diff(printed_positions(kind), axis=1)
+        chords[f"{kind}_chord_mm"] = 1e3 * np.linalg.norm(between, axis=-1).ravel()
+    return pd.DataFrame(chords, index).reset_index()
 
 
-def cap_study(caps: tuple[float, ...] = (0.0, 1e-3, 2e-3, 3e-3, 5e-3)) -> pd.DataFrame:
+def cap_study(caps: Sequence[float]) -> pd.DataFrame:
     """Fit Table II's simulated poses with rigid caps of several lengths [m] after the soft segments.
 
     Returns
@@ -94,6 +83,5 @@ def cap_study(caps: tuple[float, ...] = (0.0, 1e-3, 2e-3, 3e-3, 5e-3)) -> pd.Dat
         for cap in caps
         for configuration, pose in enumerate(table2_poses(CableDrivenArm(cap_length=cap, coupling_sign=sign)))
     ]
-    return pd.DataFrame(
-        rows, columns=["cap_mm", "coupling_sign", "configuration", "mid_residual_mm", "tip_residual_mm"]
-    )
+    columns = ["cap_mm", "coupling_sign", "configuration", "mid_residual_mm", "tip_residual_mm"]
+    return pd.DataFrame(rows, columns=columns)

@@ -1,1 +1,1 @@
-"""Figures of the gesture-steering paper, one function per figure, named after the paper's numbers."""
+"""Figures, one function per figure, named after the paper's numbers; they draw, and compute no results."""

@@ -1,7 +1,5 @@
 """Figures of the hand and its filters (Lai et al., Figs. 3 to 5)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -9,6 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from soro_lib.paths import A4_PAPER
 from soro_lib.replication.plotting import (
     COLORS,
     ESTIMATE,
@@ -19,6 +18,7 @@ from soro_lib.replication.plotting import (
     legend,
     new_figure,
 )
+from soro_lib.sensing.hand_tracking import FINGERS
 
 MODE_COLORS = {
     "palm": COLORS["light"],
@@ -28,6 +28,13 @@ MODE_COLORS = {
 }
 """One colour per gesture, in every figure."""
 MODE_NAMES = {"palm": "palm", "v_sign": "V-sign", "thumbs_up": "thumbs-up", "fist": "fist"}
+AXIS_COLORS = {"x": COLORS["blue"], "y": COLORS["green"], "z": COLORS["purple"]}
+"""One colour per axis, where all three are drawn."""
+
+
+def line_style(style: dict[str, Any]) -> dict[str, Any]:
+    """Return the part of a style that is about a line alone."""
+    return {key: style[key] for key in ("color", "linestyle", "linewidth")}
 
 
 def shade_modes(axes: Any, time: pd.Series, mode: pd.Series) -> None:
@@ -56,16 +63,15 @@ def stream_timing(table: pd.DataFrame) -> Figure:
 def palm_before_after(timeline: pd.DataFrame) -> Figure:
     """Draw the palm position before and after the filter, and what the filter removed."""
     figure, axes = new_figure(PAGE_WIDTH, 4.4, rows=3, columns=2, width_ratios=(1.5, 1), sharex=True)
-    for row, axis in enumerate("xyz"):
+    time = timeline["time_s"]
+    for (palm, removed), axis in zip(axes, "xyz"):
         raw, filtered = timeline[f"raw_{axis}_mm"], timeline[f"filtered_{axis}_mm"]
-        axes[row, 0].plot(timeline["time_s"], raw, **MEASUREMENT, label="tracker")
-        axes[row, 0].plot(
-            timeline["time_s"], filtered, **{**ESTIMATE, "linewidth": 1.0}, label="Kalman filter"
-        )
-        shade_modes(axes[row, 0], timeline["time_s"], timeline["mode"])
-        axes[row, 1].plot(timeline["time_s"], raw - filtered, **{**MEASUREMENT, "markersize": 1.5})
-        axes[row, 1].set_ylim(-2.0, 2.0)
-        label_axes(axes[row, 0], y=f"palm {axis} [mm]")
+        palm.plot(time, raw, **MEASUREMENT, label="tracker")
+        palm.plot(time, filtered, **{**ESTIMATE, "linewidth": 1.0}, label="Kalman filter")
+        shade_modes(palm, time, timeline["mode"])
+        removed.plot(time, raw - filtered, **{**MEASUREMENT, "markersize": 1.5})
+        removed.set_ylim(-2.0, 2.0)
+        label_axes(palm, y=f"palm {axis} [mm]")
     for panel in axes[2]:
         label_axes(panel, "time [s]")
     label_axes(axes[0, 0], title="Palm over the device")
@@ -76,26 +82,25 @@ def palm_before_after(timeline: pd.DataFrame) -> Figure:
 
 def goal_timeline(timeline: pd.DataFrame) -> Figure:
     """Draw the tip goal, its tilt and the gestures of a recording."""
-    figure, (top, middle, bottom) = new_figure(
-        PAGE_WIDTH, 4.6, rows=3, sharex=True, height_ratios=(1.4, 1.2, 0.8)
-    )
-    for axis, color in zip("xyz", (COLORS["blue"], COLORS["green"], COLORS["purple"])):
+    figure, axes = new_figure(PAGE_WIDTH, 4.6, rows=3, sharex=True, height_ratios=(1.4, 1.2, 0.8))
+    top, middle, bottom = axes
+    for axis, color in AXIS_COLORS.items():
         top.plot(timeline["time_s"], timeline[f"goal_{axis}_mm"], color=color, label=axis)
     middle.plot(timeline["time_s"], timeline["tilt_raw_deg"], **MEASUREMENT, label="tracker, limited to 30°")
     middle.plot(timeline["time_s"], timeline["tilt_deg"], **ESTIMATE, label="LPF-SLERP")
-    for finger, name in enumerate(("thumb", "index", "middle", "ring", "pinky")):
+    for finger, name in enumerate(FINGERS):
         extended = timeline["fingers"].str[finger] == "1"
-        bottom.fill_between(timeline["time_s"], finger - 0.35, finger + 0.35, where=extended, step="post",
-                            color=COLORS["grey"], linewidth=0)  # fmt: skip
+        bar = {"where": extended, "step": "post", "color": COLORS["grey"], "linewidth": 0}
+        bottom.fill_between(timeline["time_s"], finger - 0.35, finger + 0.35, **bar)
         bottom.annotate(name, (1.005, finger), xycoords=("axes fraction", "data"), va="center", fontsize=7.5)
     bottom.set(yticks=[], ylim=(-0.6, 4.6))
     bottom.grid(False)
-    for panel in (top, middle, bottom):
+    for panel in axes:
         shade_modes(panel, timeline["time_s"], timeline["mode"])
     seen = [mode for mode in MODE_COLORS if mode != "palm" and (timeline["mode"] == mode).any()]
     patches = [Rectangle((0, 0), 1, 1, color=MODE_COLORS[mode], alpha=0.25) for mode in seen]
-    bottom.legend(patches, [MODE_NAMES[mode] for mode in seen], loc="upper center", ncols=3,
-                  bbox_to_anchor=(0.5, -0.45))  # fmt: skip
+    names, below = [MODE_NAMES[mode] for mode in seen], {"bbox_to_anchor": (0.5, -0.45)}
+    bottom.legend(patches, names, loc="upper center", ncols=3, **below)
     label_axes(top, y="goal [mm]", title="What the hand asks of the tip")
     label_axes(middle, y="tilt [deg]")
     label_axes(bottom, "time [s]", "extended")
@@ -104,10 +109,11 @@ def goal_timeline(timeline: pd.DataFrame) -> Figure:
     return figure
 
 
-def fig05_a4_sheet(palm: pd.DataFrame, finger: pd.DataFrame, width: float, length: float) -> Figure:
+def fig05_a4_sheet(palm: pd.DataFrame, finger: pd.DataFrame) -> Figure:
     """Draw palm and finger tracing the edges of an A4 sheet, and the palm's tilt."""
     figure, (left, right) = new_figure(PAGE_WIDTH, 3.2, columns=2, width_ratios=(1.35, 1))
-    left.add_patch(Rectangle((-length / 2, -width / 2), length, width, fill=False, **_edge()))
+    length, width = 1e3 * np.array(A4_PAPER)
+    left.add_patch(Rectangle((-length / 2, -width / 2), length, width, fill=False, **line_style(REFERENCE)))
     left.plot([], [], **REFERENCE, label="sheet")
     left.plot(palm["x_mm"], palm["z_mm"], **ESTIMATE, label="palm")
     left.plot(finger["x_mm"], finger["z_mm"], color=COLORS["green"], linewidth=1.6, label="finger tip")
@@ -135,7 +141,3 @@ def filter_comparison(table: pd.DataFrame) -> Figure:
     label_axes(right, y="lag [ms]")
     legend(figure)
     return figure
-
-
-def _edge() -> dict[str, Any]:
-    return {key: REFERENCE[key] for key in ("color", "linestyle", "linewidth")}

@@ -1,7 +1,6 @@
 """Figures of the simulated prototype (Lai et al., Figs. 10 and 11, Table II)."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
+from soro_lib.papers.gesture_steering.figures.hands import AXIS_COLORS, line_style
+from soro_lib.papers.gesture_steering.figures.steering import arm_pieces
 from soro_lib.replication.plotting import (
     COLORS,
     ESTIMATE,
@@ -28,6 +29,11 @@ from soro_lib.robots import CableDrivenArm
 Array = NDArray[np.float64]
 
 PANELS = {"a": "palm hover", "b": "V-sign hover", "c": "circle", "d": "swaying arc"}
+BOUNDS = (
+    ("position_error_mm", "position error [mm]", 4.0),
+    ("direction_error_deg", "direction error [deg]", 5.0),
+)
+"""Errors of Fig. 10: column, label, and the bound that the paper claims."""
 
 
 def fig10_hover_and_paths(measured: pd.DataFrame) -> Figure:
@@ -35,35 +41,31 @@ def fig10_hover_and_paths(measured: pd.DataFrame) -> Figure:
     figure, axes = new_figure(PAGE_WIDTH, 5.4, rows=3, columns=4, sharex="col", sharey="row")
     for column, (letter, rows) in enumerate(measured.groupby("panel")):
         one = rows[rows["session"] == 0]
-        for axis, color in zip("xyz", (COLORS["blue"], COLORS["green"], COLORS["purple"])):
+        for axis, color in AXIS_COLORS.items():
             axes[0, column].plot(one["time_s"], one[f"mea_{axis}_mm"], **{**MEASUREMENT, "color": color})
             axes[0, column].plot(one["time_s"], one[f"sim_{axis}_mm"], color=color, linewidth=1.0, label=axis)
-        for row, (name, bound) in enumerate(
-            (("position_error_mm", 4.0), ("direction_error_deg", 5.0)), start=1
-        ):
+        for panel, (name, label, bound) in zip(axes[1:, column], BOUNDS):
             groups = rows.groupby("time_s")[name]
             low, high = groups.quantile(0.025), groups.quantile(0.975)
-            error_band(axes[row, column], low.index, low, high)
-            axes[row, column].plot(low.index, groups.mean(), **ESTIMATE)
-            axes[row, column].axhline(bound, color=COLORS["vermillion"], linestyle="--", linewidth=1.0)
-            axes[row, column].set_ylim(0, 1.9 * bound)
+            error_band(panel, low.index, low, high)
+            panel.plot(low.index, groups.mean(), **ESTIMATE)
+            panel.axhline(bound, color=COLORS["vermillion"], linestyle="--", linewidth=1.0)
+            panel.set_ylim(0, 1.9 * bound)
+            label_axes(panel, y="" if column else label)
         label_axes(axes[0, column], title=f"({letter}) {PANELS[str(letter)]}")
         label_axes(axes[2, column], "time [s]")
-    for panel, text in zip(axes[:, 0], ("tip [mm]", "position error [mm]", "direction error [deg]")):
-        label_axes(panel, y=text)
+    label_axes(axes[0, 0], y="tip [mm]")
     axes[0, 3].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
-def fig11_configurations(actuations: list[Array], sim: Array, exp: Array) -> Figure:
+def fig11_configurations(actuations: Sequence[Array], sim: Array, exp: Array) -> Figure:
     """Draw the four configurations of Table II from the front and the side [mm], with the printed points."""
     arm = CableDrivenArm()
     figure, axes = new_figure(PAGE_WIDTH, 4.3, columns=8, sharey=True)
     for index, panel in enumerate(axes):
         configuration, axis = divmod(index, 2)
-        points = arm.backbone(actuations[configuration], 20) * 1e3
-        pieces = (points[:21], points[20:41], points[40:])
-        for piece, color in zip(pieces, (COLORS["light"], COLORS["blue"], COLORS["orange"])):
+        for piece, color in arm_pieces(arm, actuations[configuration]):
             panel.plot(piece[:, axis], piece[:, 2], color=color, linewidth=6, solid_capstyle="butt", zorder=1)
         panel.plot(*sim[configuration][:, (axis, 2)].T * 1e3, **GOAL, label="printed simulation")
         panel.plot(*exp[configuration][:, (axis, 2)].T * 1e3, "o", color=COLORS["black"], markersize=3.5,
@@ -99,16 +101,13 @@ def cause_shares(table: pd.DataFrame) -> Figure:
     """Draw what each cause does alone: probability of the 2-mm claim and the largest error along X."""
     figure, (left, right) = new_figure(PAGE_WIDTH, 2.9, columns=2, sharey=True)
     causes = table["cause"].unique()[::-1]
-    for offset, (control, rows), color in zip(
-        (0.2, -0.2), table.groupby("control", sort=False), ("blue", "orange")
-    ):
-        ordered = rows.set_index("cause").loc[causes]
-        left.barh(np.arange(len(causes)) + offset, ordered["claim"], height=0.36, color=COLORS[color],
-                  label=f"{control} control")  # fmt: skip
-        worst = ordered[["x_mm", "y_mm", "z_mm"]].max(axis=1)
-        right.barh(np.arange(len(causes)) + offset, worst, height=0.36, color=COLORS[color])
+    for control, offset, color in (("force", 0.2, "blue"), ("length", -0.2, "orange")):
+        rows = table[table["control"] == control].set_index("cause").loc[causes]
+        place, style = np.arange(len(causes)) + offset, {"height": 0.36, "color": COLORS[color]}
+        left.barh(place, rows["claim"], label=f"{control} control", **style)
+        right.barh(place, rows[["x_mm", "y_mm", "z_mm"]].max(axis=1), **style)
     left.set_yticks(np.arange(len(causes)), causes)
-    right.axvline(2.0, **{key: REFERENCE[key] for key in ("color", "linestyle", "linewidth")})
+    right.axvline(2.0, **line_style(REFERENCE))
     label_axes(left, "probability that all axes are within 2 mm", title="One cause at a time")
     label_axes(right, "largest axis error, median session [mm]")
     legend(figure)
@@ -118,16 +117,11 @@ def cause_shares(table: pd.DataFrame) -> Figure:
 def steady_state_errors(steady: pd.DataFrame) -> Figure:
     """Draw the steady-state errors of Fig. 10 over sessions, by panel."""
     figure, axes = new_figure(PAGE_WIDTH, 2.4, columns=2)
-    for panel, column, bound, unit in zip(
-        axes,
-        ("position_error_mm", "direction_error_deg"),
-        (4.0, 5.0),
-        ("position error [mm]", "direction error [deg]"),
-    ):
+    for panel, (column, label, bound) in zip(axes, BOUNDS):
         box_groups(panel, {str(letter): rows[column] for letter, rows in steady.groupby("panel")})
         panel.axhline(bound, color=COLORS["vermillion"], linestyle="--", linewidth=1.2)
         panel.set_ylim(0, None)
-        label_axes(panel, "panel of Fig. 10", unit)
+        label_axes(panel, "panel of Fig. 10", label)
     return figure
 
 

@@ -1,1 +1,1 @@
-"""The simulated hand and the simulated arm of the gesture-steering paper."""
+"""The simulated hand and the arm as it was built: what an experiment acts on, nothing that evaluates it."""

@@ -5,8 +5,6 @@ tracker's clock has holes, the tremor is coloured and not white, fingers switch 
 gesture changes, the reported palm shifts meanwhile, and a hand that is lost comes back under a new identity.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
@@ -22,10 +20,10 @@ Array = NDArray[np.float64]
 Path = Callable[[Array], Array]
 
 FINGER_FLAGS = {
-    "palm": (1, 1, 1, 1, 1),
-    "v_sign": (0, 1, 1, 0, 0),
-    "thumbs_up": (1, 0, 0, 0, 0),
-    "fist": (0, 0, 0, 0, 0),
+    "palm": (True, True, True, True, True),
+    "v_sign": (False, True, True, False, False),
+    "thumbs_up": (True, False, False, False, False),
+    "fist": (False, False, False, False, False),
 }
 """Extended fingers (thumb to pinky) of the four gestures; Lai et al., Fig. 4."""
 
@@ -142,16 +140,13 @@ def synthetic_recording(
     time = tracker_clock(rng, duration, noise)
     flags, change = _finger_flags(rng, time, gestures, noise)
 
-    palm = (
-        position(time)
-        + _unsteadiness(rng, time, noise)
-        + change[:, None] * _direction(rng) * noise.transit_shift
-    )
+    shift = _unsteadiness(rng, time, noise)
+    palm = position(time) + shift + change[:, None] * _direction(rng) * noise.transit_shift
     wobble = np.column_stack([coloured_noise(rng, time, noise.normal) for _ in range(3)])
     turn = change[:, None] * _direction(rng) * noise.transit_turn
     hand = Rotation.from_rotvec(wobble + turn) * Rotation.from_rotvec(tilt(time))
     normal, direction = hand.apply([0.0, -1.0, 0.0]), hand.apply([0.0, 0.0, -1.0])
-    normal = _flipped(rng, time, normal, noise)
+    normal[rng.integers(0, len(time), rng.poisson(noise.flips * time[-1]))] *= -1.0
 
     table = pd.DataFrame({"timestamp_us": np.round(time * 1e6).astype(np.int64) + 1_000_000})
     table["frame_id"] = np.arange(len(time)) + np.cumsum(rng.random(len(time)) < 0.0024)
@@ -174,10 +169,8 @@ def tracker_clock(rng: np.random.Generator, duration: float, noise: HandNoise) -
     return time[time <= duration]
 
 
-def coloured_noise(
-    rng: np.random.Generator, time: Array, detrended_sd: float, exponent: float = 3.75
-) -> Array:
-    """Return tremor whose power falls as frequency to the minus ``exponent`` between 0.5 and 22 Hz.
+def coloured_noise(rng: np.random.Generator, time: Array, detrended_sd: float) -> Array:
+    """Return tremor whose power falls as frequency to the minus 3.75 between 0.5 and 22 Hz.
 
     Parameters
     ----------
@@ -187,8 +180,6 @@ def coloured_noise(
         Sample times [s].
     detrended_sd : float
         Median standard deviation about a parabola in windows of one second, in the unit of the result.
-    exponent : float
-        Slope of the power spectral density [-].
 
     Returns
     -------
@@ -197,14 +188,18 @@ def coloured_noise(
     """
     rate = 200.0
     count = int(np.ceil((time[-1] - time[0] + 2.0) * rate))
-    series = _shaped(rng, count, rate, 0.5, 22.0, exponent)
+    series = _shaped(rng, count, rate)
     measured = _detrended_sd(series, int(rate))
     grid = time[0] + np.arange(count) / rate
     return np.interp(time, grid, series * detrended_sd / measured)
 
 
-def wandering(rng: np.random.Generator, duration: float, low: Sequence[float], high: Sequence[float],
-              dwell: float = 1.2) -> Path:  # fmt: skip
+def constant(*value: float) -> Path:
+    """Return the path that stays at a point."""
+    return lambda time: np.tile(value, (len(time), 1))
+
+
+def wandering(rng: np.random.Generator, duration: float, low: Sequence[float], high: Sequence[float]) -> Path:
     """Return a smooth random path through a box, as a person steering at leisure would take.
 
     Parameters
@@ -215,14 +210,13 @@ def wandering(rng: np.random.Generator, duration: float, low: Sequence[float], h
         Time to cover [s].
     low, high : sequences of n floats
         Corners of the box, any unit.
-    dwell : float
-        Mean time between way points [s].
 
     Returns
     -------
     callable
         Maps times (m,) [s] to (m, n) in the unit of the box; never leaves the box.
     """
+    dwell = 1.2  # mean time between way points [s]
     knots = np.cumsum(rng.uniform(0.5 * dwell, 1.5 * dwell, size=int(2 * duration / dwell) + 4)) - dwell
     knots[0] = 0.0
     points = rng.uniform(low, high, size=(len(knots), len(low)))
@@ -269,10 +263,9 @@ def _direction(rng: np.random.Generator) -> Array:
     return vector / np.linalg.norm(vector)
 
 
-def _shaped(
-    rng: np.random.Generator, count: int, rate: float, low: float, high: float, exponent: float
-) -> Array:
-    """Return Gaussian noise (count,) with a power-law spectrum between two frequencies [Hz]."""
+def _shaped(rng: np.random.Generator, count: int, rate: float) -> Array:
+    """Return Gaussian noise (count,) with a power-law spectrum between two frequencies."""
+    low, high, exponent = 0.5, 22.0, 3.75
     frequency = np.fft.rfftfreq(count, 1 / rate)
     inside = (frequency >= low) & (frequency <= high)
     amplitude = np.where(inside, np.maximum(frequency, low) ** (-exponent / 2), 0.0)
@@ -300,7 +293,7 @@ def _unsteadiness(rng: np.random.Generator, time: Array, noise: HandNoise) -> Ar
 
 def _finger_flags(
     rng: np.random.Generator, time: Array, gestures: Sequence[tuple[float, str]], noise: HandNoise
-) -> tuple[NDArray[np.int64], Array]:
+) -> tuple[NDArray[np.bool_], Array]:
     """Return finger flags (n, 5) and, per frame, how much a change of gesture is under way (0 to 1)."""
     flags = np.tile(FINGER_FLAGS[gestures[0][1]], (len(time), 1))
     change = np.zeros(len(time))
@@ -313,16 +306,8 @@ def _finger_flags(
     for (start, name), end in zip(gestures, ends):
         if name == "thumbs_up":
             for instant in rng.uniform(start, end, rng.poisson(noise.thumb_error * (end - start))):
-                flags[(time >= instant) & (time < instant + rng.uniform(0.02, 0.09)), 0] = 0
+                flags[(time >= instant) & (time < instant + rng.uniform(0.02, 0.09)), 0] = False
     return flags, np.minimum(change, 1.0)
-
-
-def _flipped(rng: np.random.Generator, time: Array, normal: Array, noise: HandNoise) -> Array:
-    """Turn the normal over in single frames."""
-    flips = rng.integers(0, len(time), rng.poisson(noise.flips * time[-1]))
-    normal = normal.copy()
-    normal[flips] *= -1.0
-    return normal
 
 
 def _reported_velocity(time: Array, palm: Array, lag: float) -> Array:
@@ -345,12 +330,8 @@ def _with_losses(rng: np.random.Generator, table: pd.DataFrame, noise: HandNoise
         lost, after = (time >= instant) & (time < instant + lasting), time >= instant + lasting
         table.loc[after, "hand_id"] = int(table["hand_id"].max()) + 1
         table.loc[after, "hand_type"] = "left" if rng.random() < 0.2 else "right"
-        jump = (
-            _direction(rng)
-            * (10.0 if lasting < 0.1 else 60.0)
-            * np.exp(-(time[after] - instant) / 1.0)[:, None]
-        )
-        table.loc[after, list(PALM)] += jump
+        jump = _direction(rng) * (10.0 if lasting < 0.1 else 60.0)
+        table.loc[after, list(PALM)] += jump * np.exp(-(time[after] - instant) / 1.0)[:, None]
         unseen |= lost
     table.loc[unseen, hand] = pd.NA
     return table

@@ -5,9 +5,8 @@ No error is added to make a figure. Two actuations are offered: cables pulled wi
 cables wound to a commanded length.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,15 +66,11 @@ class PrototypeRanges:
             if value.ndim and value[0] > value[1]:
                 raise ValueError(f"PrototypeRanges.{item.name} = {tuple(value)}, must be (low, high)")
 
-    def only(self, *names: str) -> PrototypeRanges:
+    def only(self, *names: str) -> "PrototypeRanges":
         """Return the same ranges with every cause but the named ones switched off."""
-        off: dict[str, object] = {
-            "bending_rigidity": (1.0, 1.0),
-            "axial_rigidity": (1.0, 1.0),
-            "friction": (0.0, 0.0),
-        }
-        values = {item.name: off.get(item.name, 0.0) for item in fields(self)}
-        return PrototypeRanges(**{**values, **{name: getattr(self, name) for name in names}})
+        off: dict[str, Any] = dict.fromkeys((item.name for item in fields(self)), 0.0)
+        off |= {"bending_rigidity": (1.0, 1.0), "axial_rigidity": (1.0, 1.0), "friction": (0.0, 0.0)}
+        return PrototypeRanges(**{**off, **{name: getattr(self, name) for name in names}})
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +129,9 @@ class Prototype:
             +1 when the cables were last pulled, -1 when they were last released: the sign of friction.
         """
         command = self.arm.check(actuation)
-        tension = (
-            self._tension_from_length(command) if by_length else self._tension_from_force(command, branch)
-        )
-        return self._pieces(command[0], tension)
+        if by_length:
+            return self._pieces(command[0], self._tension_from_length(command))
+        return self._pieces(command[0], self._tension_from_force(command, branch))
 
     def points(
         self, actuation: ArrayLike, by_length: bool = False, branch: float = 1.0
@@ -175,7 +169,7 @@ class Prototype:
         wrapped = np.repeat([bend[0], bend[0] + bend[1]], 3)
         return pulled * np.exp(-branch * self.friction[:, None] * wrapped)
 
-    def _tension_from_length(self, command: Array, iterations: int = 30) -> Array:
+    def _tension_from_length(self, command: Array) -> Array:
         """Return tensions (n, 6) [N] that make every cable as long as wound, or slack.
 
         Solves ``0 <= tension``, ``0 <= wound - path``, one of them zero, by a semismooth Newton method on
@@ -185,7 +179,7 @@ class Prototype:
         wound = nominal._cable_lengths(-command[None, 1:]) + self.length_zero
         tension = np.tile(np.maximum(-command[1:], 1e-3), (self.sessions, 1))
         scale = 300.0  # N/m, the stiffness a cable feels: makes both terms newtons
-        for _ in range(iterations):
+        for _ in range(30):
             path = self._cable_lengths(tension)
             gap = scale * (wound - path)
             residual = np.minimum(tension, gap)
@@ -253,21 +247,16 @@ def drawn_prototype(
     def normal(sd: float, width: int) -> Array:
         return sd * rng.standard_normal((sessions, width))
 
-    lean = np.zeros((sessions, 3))
-    offset = np.zeros((sessions, 3))
-    bending, axial = (
-        rng.uniform(*ranges.bending_rigidity, sessions),
-        rng.uniform(*ranges.axial_rigidity, sessions),
-    )
-    radius, friction = (
-        arm.cable_radius + normal(ranges.cable_radius_sd, 6),
-        rng.uniform(*ranges.friction, sessions),
-    )
+    lean, offset = np.zeros((2, sessions, 3))
+    bending = arm.bending_rigidity * rng.uniform(*ranges.bending_rigidity, sessions)
+    axial = arm.axial_rigidity * rng.uniform(*ranges.axial_rigidity, sessions)
+    radius = arm.cable_radius + normal(ranges.cable_radius_sd, 6)
+    friction = rng.uniform(*ranges.friction, sessions)
     tension_zero, length_zero = normal(ranges.tension_zero_sd, 6), normal(ranges.length_zero_sd, 6)
     offset[:, :2], lean[:, :2] = normal(ranges.base_offset_sd, 2), normal(ranges.base_lean_sd, 2)
     return Prototype(
-        arm, arm.bending_rigidity * bending, arm.axial_rigidity * axial, radius, friction,
-        tension_zero, length_zero, offset, lean, ranges.camera_sd, ranges.depth_resolution,
+        arm, bending, axial, radius, friction, tension_zero, length_zero, offset, lean,
+        ranges.camera_sd, ranges.depth_resolution,
     )  # fmt: skip
 
 

@@ -1,1 +1,4 @@
-"""Experiments on visual-strain fusion and hybrid control (Wang et al., T-RO 2023)."""
+"""What the paper did, one module per experiment, each a function that returns runs or a table.
+
+No drawing here, no numbers of the paper: those are in ``figures`` and ``findings``.
+"""

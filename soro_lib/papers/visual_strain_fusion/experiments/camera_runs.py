@@ -8,6 +8,7 @@ the similarity of Eq. (30), fitted on a sweep before the run to an electromagnet
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -17,22 +18,16 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
+from soro_lib.papers.visual_strain_fusion.world import scene as surroundings
 from soro_lib.papers.visual_strain_fusion.world.motion import ArmMotion, move, spiral
-from soro_lib.papers.visual_strain_fusion.world.scene import (
-    ENDOSCOPE,
-    BrickScene,
-    Timeline,
-    ViewConditions,
-    moving_obstacles,
-    photograph,
-    undisturbed,
-    varying_light,
-)
+from soro_lib.papers.visual_strain_fusion.world.scene import ENDOSCOPE, BrickScene, ViewConditions, photograph
 from soro_lib.project import data_directory
 from soro_lib.replication.datacards import verified
-from soro_lib.sensing.monocular_vision import MonocularTracker, TrackedFrame, TrackerSettings, fit_similarity
+from soro_lib.sensing.monocular_vision import MonocularTracker, TrackedFrame, fit_similarity
 
 Array = NDArray[np.float64]
+Similarity = tuple[Array, float, Array]
+"""Rotation (3, 3), scale and translation (3,) from the map to the world (Wang et al., Eq. (30))."""
 
 SLUG = "visual_strain_fusion"
 
@@ -45,17 +40,17 @@ class Flight:
     """One run: which scene, which disturbance."""
 
     scene: int
-    timeline: Timeline
+    timeline: surroundings.Timeline
     disturbance: str
 
 
 FLIGHTS = {
-    "scene1_undisturbed": Flight(1, undisturbed, "nothing"),
-    "scene2_undisturbed": Flight(2, undisturbed, "nothing"),
-    "scene1_obstacles": Flight(1, moving_obstacles, "moving obstacles"),
-    "scene1_light": Flight(1, varying_light, "varying light"),
-    "scene2_obstacles": Flight(2, moving_obstacles, "moving obstacles"),
-    "scene2_light": Flight(2, varying_light, "varying light"),
+    "scene1_undisturbed": Flight(1, surroundings.undisturbed, "nothing"),
+    "scene2_undisturbed": Flight(2, surroundings.undisturbed, "nothing"),
+    "scene1_obstacles": Flight(1, surroundings.moving_obstacles, "moving obstacles"),
+    "scene1_light": Flight(1, surroundings.varying_light, "varying light"),
+    "scene2_obstacles": Flight(2, surroundings.moving_obstacles, "moving obstacles"),
+    "scene2_light": Flight(2, surroundings.varying_light, "varying light"),
 }
 """The stored runs; settings were chosen on scene 1 and applied unchanged to scene 2."""
 
@@ -90,25 +85,18 @@ MAP_ARRAYS = {
 """Arrays of a stored map, with units."""
 
 
-def calibration_sweep(bending: float = 0.4, steps: int = 60) -> ArmMotion:
+def calibration_sweep() -> ArmMotion:
     """Return the slow sweep along x and along y before a run, there and back, twice.
 
-    Parameters
-    ----------
-    bending : float, optional
-        Largest bending angle [rad].
-    steps : int, optional
-        Steps of 0.05 s from the middle to the end.
+    It goes to a bending angle of 0.4 rad, 3 s from the middle to the end.
     """
-    out = np.linspace(0.0, bending, steps)
-    leg, rest = np.concatenate([out, out[::-1]]), np.zeros(2 * steps)
+    out = np.linspace(0.0, 0.4, 60)
+    leg, rest = np.concatenate([out, out[::-1]]), np.zeros(120)
     once = np.concatenate([np.stack([leg, rest], axis=-1), np.stack([rest, leg], axis=-1)])
     return move(np.concatenate([once, once]))
 
 
-def start_tracker(
-    scene: BrickScene, rng: np.random.Generator, settings: TrackerSettings | None = None
-) -> tuple[MonocularTracker, tuple[Array, float, Array]]:
+def start_tracker(scene: BrickScene, rng: np.random.Generator) -> tuple[MonocularTracker, Similarity]:
     """Return a tracker with a first map, and its similarity to the world (Eq. (30)).
 
     The first sweep builds the map; the second, seen by camera and electromagnetic tracker, gives the scale.
@@ -118,7 +106,7 @@ def start_tracker(
     RuntimeError
         If the tracker found no map on the sweep.
     """
-    tracker = MonocularTracker(ENDOSCOPE, settings)
+    tracker = MonocularTracker(ENDOSCOPE)
     sweep = calibration_sweep()
     seen, measured = [], []
     for step, pose in enumerate(sweep.pose):
@@ -127,18 +115,12 @@ def start_tracker(
             seen.append(frame.pose[:3, 3])
             measured.append(pose[:3] + rng.normal(0.0, EM_NOISE, 3))
     if len(seen) < 10:
-        raise RuntimeError(
-            f"the tracker has no map after the sweep: only {len(seen)} of its frames gave a pose"
-        )
+        raise RuntimeError(f"the tracker has no map after the sweep: only {len(seen)} frames gave a pose")
     return tracker, fit_similarity(seen, measured)
 
 
 def fly(
-    flight: Flight,
-    seed: int,
-    steps: int = 4000,
-    report: Callable[[int], None] | None = None,
-    settings: TrackerSettings | None = None,
+    flight: Flight, seed: int, steps: int, report: Callable[[int], None] = lambda frames: None
 ) -> tuple[pd.DataFrame, dict[str, NDArray[Any]]]:
     """Render and track one run.
 
@@ -148,12 +130,10 @@ def fly(
         Scene and disturbance.
     seed : int
         Of the sensor noise and the noise of the electromagnetic tracker.
-    steps : int, optional
+    steps : int
         Steps of 0.05 s; the spiral ends early if fewer than 4000.
     report : callable, optional
         Called with the number of the frame just done.
-    settings : TrackerSettings, optional
-        Settings of the tracker.
 
     Returns
     -------
@@ -166,42 +146,36 @@ def fly(
     cv2.setNumThreads(1)
     with threadpool_limits(1):
         scene, motion = BrickScene(flight.scene), spiral()
-        tracker, similarity = start_tracker(scene, rng, settings)
+        tracker, similarity = start_tracker(scene, rng)
         rows = []
         for step in range(steps):
             conditions = flight.timeline(motion.time[step])
             frame = tracker.track(photograph(scene, motion.pose[step], conditions, _noise(rng)))
-            row = _row(motion.time[step], conditions.phase, frame, similarity)
-            rows.append([*row, *1e3 * motion.pose[step, :3]])
-            if report is not None:
-                report(step + 1)
+            measured = _row(frame, similarity)
+            rows.append([motion.time[step], conditions.phase, *measured, *1e3 * motion.pose[step, :3]])
+            report(step + 1)
     rotation, scale, translation = similarity
-    point_map: dict[str, NDArray[Any]] = {
-        "positions": (scale * tracker.map.positions @ rotation.T + translation).astype(np.float32),
-        "descriptors": tracker.map.descriptors,
-        "directions": (tracker.map.directions @ rotation.T).astype(np.float32),
-    }
-    return pd.DataFrame(rows, columns=pd.Index(COLUMNS)), point_map
+    positions = (scale * tracker.map.positions @ rotation.T + translation).astype(np.float32)
+    directions = (tracker.map.directions @ rotation.T).astype(np.float32)
+    arrays = (positions, tracker.map.descriptors, directions)
+    return pd.DataFrame(rows, columns=pd.Index(COLUMNS)), dict(zip(MAP_ARRAYS, arrays))
 
 
-def metric_pose(pose: Array, similarity: tuple[Array, float, Array]) -> Array:
+def metric_pose(pose: Array, similarity: Similarity) -> Array:
     """Return a pose (7,) in the world from one (4, 4) in the map (Wang et al., Eq. (30))."""
     rotation, scale, translation = similarity
     quaternion = Rotation.from_matrix(rotation @ pose[:3, :3]).as_quat(canonical=True)
     return np.concatenate([scale * rotation @ pose[:3, 3] + translation, quaternion])
 
 
-def _row(time: float, phase: int, frame: TrackedFrame, similarity: tuple[Array, float, Array]) -> list[float]:
+def _row(frame: TrackedFrame, similarity: Similarity) -> list[float]:
+    """Return what a recording holds of a tracked frame, from "tracked" to the quaternion."""
     pose = metric_pose(frame.pose, similarity)
-    errors = (frame.inlier_error, frame.match_error, 1e3 * similarity[1] * frame.position_spread)
-    counts = (phase, int(frame.tracked), frame.features, frame.matches, frame.inliers)
-    return [
-        time,
-        *counts,
-        *(error if frame.tracked else np.nan for error in errors),
-        *1e3 * pose[:3],
-        *pose[3:],
-    ]
+    errors = [frame.inlier_error, frame.match_error, 1e3 * similarity[1] * frame.position_spread]
+    if not frame.tracked:
+        errors = [np.nan] * 3
+    counts = (int(frame.tracked), frame.features, frame.matches, frame.inliers)
+    return [*counts, *errors, *1e3 * pose[:3], *pose[3:]]
 
 
 def _noise(rng: np.random.Generator) -> NDArray[np.float32]:
@@ -218,14 +192,16 @@ def load_flight(name: str) -> pd.DataFrame:
     DataCardError
         If the recording does not match its card.
     """
-    if name not in FLIGHTS:
-        raise KeyError(f"no flight {name!r}; there are {', '.join(FLIGHTS)}")
-    return pd.read_csv(verified(data_directory(SLUG) / f"{name}.csv.gz"))
+    return pd.read_csv(_stored(name, ".csv.gz"))
 
 
 def load_map(name: str) -> dict[str, NDArray[Any]]:
     """Return the stored map of a flight, arrays :data:`MAP_ARRAYS`."""
+    with np.load(_stored(name, "_map.npz")) as arrays:
+        return {key: arrays[key] for key in MAP_ARRAYS}
+
+
+def _stored(name: str, ending: str) -> Path:
     if name not in FLIGHTS:
         raise KeyError(f"no flight {name!r}; there are {', '.join(FLIGHTS)}")
-    with np.load(verified(data_directory(SLUG) / f"{name}_map.npz")) as arrays:
-        return {key: arrays[key] for key in MAP_ARRAYS}
+    return verified(data_directory(SLUG) / f"{name}{ending}")

@@ -7,14 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import FLIGHTS, load_map
+from soro_lib.papers.visual_strain_fusion.world import scene as surroundings
 from soro_lib.papers.visual_strain_fusion.world.motion import spiral
-from soro_lib.papers.visual_strain_fusion.world.scene import (
-    ENDOSCOPE,
-    BrickScene,
-    ViewConditions,
-    photograph,
-    tip_camera,
-)
+from soro_lib.papers.visual_strain_fusion.world.scene import ENDOSCOPE, ViewConditions, tip_camera
 from soro_lib.sensing.camera import Camera, Image, look_at, transform_points
 from soro_lib.sensing.monocular_vision import MonocularTracker, PointMap, TrackedFrame
 from soro_lib.worlds.rendering import TexturedQuad, render
@@ -50,6 +45,11 @@ class View:
     image: Image
     frame: TrackedFrame
 
+    @property
+    def found(self) -> str:
+        """What the tracker found, in words."""
+        return f"{self.frame.inliers} of {self.frame.features} features fit" if self.frame.tracked else "lost"
+
 
 class FlightViewer:
     """Renders any frame of a stored flight again, and locates it in the map of that flight.
@@ -64,7 +64,7 @@ class FlightViewer:
 
     def __init__(self, name: str, color: bool = True) -> None:
         self.flight, self.motion = FLIGHTS[name], spiral()
-        self.scene = BrickScene(self.flight.scene, color)
+        self.scene = surroundings.BrickScene(self.flight.scene, color)
         stored = load_map(name)
         point_map = PointMap()
         point_map.positions = stored["positions"].astype(float)
@@ -79,7 +79,7 @@ class FlightViewer:
         conditions = conditions or self.flight.timeline(self.motion.time[step])
         channels = (3,) if self.scene.color else ()
         noise = rng.standard_normal((ENDOSCOPE.height, ENDOSCOPE.width, *channels), dtype=np.float32)
-        return photograph(self.scene, self.motion.pose[step], conditions, noise)
+        return surroundings.photograph(self.scene, self.motion.pose[step], conditions, noise)
 
     def view(self, step: int, rng: np.random.Generator, conditions: ViewConditions | None = None) -> View:
         """Return the picture of a step with its features and inliers.

@@ -16,17 +16,17 @@ from soro_lib.controllers.actuation_map import ActuationMap
 from soro_lib.controllers.hybrid import HybridController, HybridSettings
 from soro_lib.estimators.extreme_learning_machine import ExtremeLearningMachine
 from soro_lib.estimators.visual_strain import VisualStrainEstimator, VisualStrainSettings
+from soro_lib.papers.visual_strain_fusion.experiments.estimation import LABEL_NOISE
 from soro_lib.papers.visual_strain_fusion.experiments.tracking import load_plant
 from soro_lib.papers.visual_strain_fusion.world.motion import PERIOD, glue_fibre, tip_pose
 from soro_lib.papers.visual_strain_fusion.world.plant import (
+    Array,
     BackboneParameters,
     ChamberParameters,
     PneumaticPlant,
     Wall,
 )
 from soro_lib.robots.pneumatic import PneumaticArm
-
-Array = NDArray[np.float64]
 
 TARGETS = 1500
 APPROACH = 200
@@ -41,22 +41,8 @@ OCTOPUS = 1e-3 * np.array(
 )
 """Points that the curve passes through [m]."""
 
-
-@dataclass(frozen=True)
-class CameraModel:
-    """Stand-in for the camera pipeline in a closed loop: white errors, and frames lost behind an obstacle.
-
-    Attributes
-    ----------
-    noise : tuple of 3 float
-        Standard deviation of the position along x, y, z [m].
-    loss_start, loss_end : float
-        Probability per step that the view is lost, and that it returns, while an obstacle moves [-].
-    """
-
-    noise: tuple[float, float, float] = (0.38e-3, 0.45e-3, 0.29e-3)
-    loss_start: float = 0.03
-    loss_end: float = 0.10
+LOSS_START, LOSS_END = 0.03, 0.10
+"""Probability per step that the view is lost, and that it returns, while an obstacle moves [-]."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +51,8 @@ class CurveRun:
 
     Attributes
     ----------
-    tip, feedback, target : ndarray (steps, 2)
-        True tip, fused estimate and target [m].
+    tip, target : ndarray (steps, 2)
+        True tip and target [m].
     cycle : ndarray (steps,)
         1 model-based, 2 hybrid, 3 hybrid with a moving obstacle.
     lost : ndarray (steps,) of bool
@@ -74,7 +60,6 @@ class CurveRun:
     """
 
     tip: Array
-    feedback: Array
     target: Array
     cycle: NDArray[np.int64]
     lost: NDArray[np.bool_]
@@ -96,21 +81,14 @@ def octopus(targets: int = TARGETS) -> Array:
     return paths.closed_curve(np.arange(targets) / targets, OCTOPUS)
 
 
-def fit_actuation_map(
-    chambers: ChamberParameters, lowest: float = -0.004, highest: float = 0.010
-) -> ActuationMap:
+def fit_actuation_map(chambers: ChamberParameters) -> ActuationMap:
     """Identify the actuation map by a slow sweep up and down, averaging out the play.
 
-    Parameters
-    ----------
-    chambers : ChamberParameters
-        The plant that is swept.
-    lowest, highest : float
-        Ends of the sweep of the steppers about rest [m]; what meets the limits of the arm is left out.
+    The steppers move from 4 mm below rest to 10 mm above; what meets the limits of the arm is left out.
     """
     arm = PneumaticArm()
-    commands = np.linspace(lowest, highest, 281)
-    sweep = np.concatenate([np.linspace(0.0, lowest, 100), commands, commands[::-1]])
+    commands = np.linspace(-0.004, 0.010, 281)
+    sweep = np.concatenate([np.linspace(0.0, commands[0], 100), commands, commands[::-1]])
     plant = PneumaticPlant(arm, chambers)
     elongations = []
     for command in sweep:
@@ -125,10 +103,7 @@ def fit_actuation_map(
 
 def follow_curve(
     rng: np.random.Generator,
-    *,
     fitted_map: bool,
-    gain: float = 0.1,
-    camera: CameraModel | None = None,
     wall: Wall | None = None,
     cycles: int = 3,
     targets: int = TARGETS,
@@ -141,10 +116,6 @@ def follow_curve(
         Draws the bonds of the fibre, the network, and the noise of both sensors.
     fitted_map : bool
         Whether the controller knows the fitted actuation map or takes it to be linear.
-    gain : float
-        Proportional gain K_p [-].
-    camera : CameraModel, optional
-        Errors of the camera.
     wall : Wall, optional
         A rod beside the arm.
     cycles : int
@@ -152,44 +123,37 @@ def follow_curve(
     targets : int
         Points of a cycle; fewer make the arm hurry.
     """
-    camera = camera or CameraModel()
     arm, chambers = PneumaticArm(), load_plant("pentagram").chambers
     plant = PneumaticPlant(arm, chambers, BackboneParameters(), wall=wall)
     mapping = fit_actuation_map(chambers) if fitted_map else None
-    controller = HybridController(arm, HybridSettings(proportional_gain=gain))
+    controller = HybridController(arm, HybridSettings(proportional_gain=0.1))
     estimator = VisualStrainEstimator(ExtremeLearningMachine(rng), VisualStrainSettings())
     fibre = glue_fibre(rng)
     steps = APPROACH + cycles * targets
     target = octopus(targets)[np.arange(-APPROACH, cycles * targets).clip(0) % targets]
     cycle = 1 + np.maximum(np.arange(steps) - APPROACH, 0) // targets
-    tips, feedback, lost = np.empty((steps, 2)), np.empty((steps, 2)), np.zeros(steps, dtype=bool)
+    tips, lost = np.empty((steps, 2)), np.zeros(steps, dtype=bool)
     for step in range(steps):
         configuration = plant.configuration
         pose = tip_pose(configuration)
         if step and cycle[step] == 3:
-            lost[step] = (
-                rng.random() > camera.loss_end if lost[step - 1] else rng.random() < camera.loss_start
-            )
-        seen = pose + np.concatenate([rng.normal(0.0, camera.noise), np.zeros(4)])
+            lost[step] = rng.random() > LOSS_END if lost[step - 1] else rng.random() < LOSS_START
+        seen = pose + np.concatenate([rng.normal(0.0, LABEL_NOISE), np.zeros(4)])
         shift = fibre.shift(configuration, plant.lengths - arm.home, rng)
         estimate = estimator.update(PERIOD * step, shift, None if lost[step] else seen, 1.0, 300.0)
         known = plant.motors if mapping is None else mapping.chamber_lengths(plant.motors)
         result = controller.update(estimate.pose[:2], target[step], known, compensating=bool(cycle[step] > 1))
         plant.drive(result.actuation if mapping is None else mapping.motor_lengths(result.actuation))
-        tips[step], feedback[step] = pose[:2], estimate.pose[:2]
-    return CurveRun(tips, feedback, target, cycle, lost)
+        tips[step] = pose[:2]
+    return CurveRun(tips, target, cycle, lost)
+
+
+CURVE_COLUMNS = ["cycle", "error_mm", "error_sd_mm", "error_max_mm", "deviation_mm", "deviation_sd_mm"]
 
 
 def summarise_curve(run: CurveRun) -> pd.DataFrame:
-    """Errors by cycle: columns cycle, error_mm, error_sd_mm, error_max_mm, deviation_mm, deviation_sd_mm."""
+    """Errors by cycle, `CURVE_COLUMNS`: mean, standard deviation and largest one."""
     table = pd.DataFrame({"cycle": run.cycle, "error": 1e3 * run.error, "deviation": 1e3 * run.deviation})
     groups = table.groupby("cycle")
-    return pd.DataFrame(
-        {
-            "error_mm": groups.error.mean(),
-            "error_sd_mm": groups.error.std(ddof=0),
-            "error_max_mm": groups.error.max(),
-            "deviation_mm": groups.deviation.mean(),
-            "deviation_sd_mm": groups.deviation.std(ddof=0),
-        }
-    ).reset_index()
+    means, spreads = groups.mean().add_suffix("_mm"), groups.std(ddof=0).add_suffix("_sd_mm")
+    return means.join(spreads).assign(error_max_mm=groups["error"].max()).reset_index()[CURVE_COLUMNS]

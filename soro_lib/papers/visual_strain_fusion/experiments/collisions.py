@@ -27,9 +27,7 @@ from soro_lib.papers.visual_strain_fusion.world.motion import (
     move,
     spiral_bending,
 )
-from soro_lib.papers.visual_strain_fusion.world.plant import BackboneParameters
-
-Array = NDArray[np.float64]
+from soro_lib.papers.visual_strain_fusion.world.plant import Array, BackboneParameters
 
 TABLE_VII = {
     "bare": 1e-9 * np.array([0.0765, 0.0910, 0.0922, 0.0911, 0.0729, 0.0903]),
@@ -45,6 +43,14 @@ FLICK_DECAY = 0.35
 FLICK_FREQUENCY = 3.0
 EVERY = 8.0
 FIRST = 110.0
+"""Shape of the contacts in time [s, Hz]."""
+
+EXPOSURE = 1.0 / 60.0
+PIXELS_PER_RADIAN = 520.0
+SCENE_DISTANCE = 0.1
+LARGEST_BLUR = 15.0
+"""The camera under motion blur: exposure [s], focal length [px], distance of the scene [m], and the blur at
+which the features are lost [px]."""
 
 
 @dataclass(frozen=True)
@@ -79,47 +85,12 @@ class Contact:
 
     def __post_init__(self) -> None:
         """Check the values; the error names the field and what is allowed."""
-        for name, allowed in (
-            ("kind", ("push", "flick")),
-            ("place", tuple(STATIONS)),
-            ("fibre", tuple(TABLE_VII)),
-        ):
-            if getattr(self, name) not in allowed:
-                raise ValueError(f"{name} must be one of {allowed}, got {getattr(self, name)!r}")
+        allowed = {"kind": ("push", "flick"), "place": tuple(STATIONS), "fibre": tuple(TABLE_VII)}
+        for name, values in allowed.items():
+            if getattr(self, name) not in values:
+                raise ValueError(f"{name} must be one of {values}, got {getattr(self, name)!r}")
         if not 0.0 < self.force < 1e4:
             raise ValueError(f"force must lie in (0, 1e4), got {self.force}")
-
-
-@dataclass(frozen=True)
-class CameraBlur:
-    """Stand-in for the camera pipeline under motion blur.
-
-    Attributes
-    ----------
-    noise : tuple of 3 float
-        Standard deviation of a sharp pose along x, y, z [m].
-    exposure : float
-        Exposure time [s].
-    pixels_per_radian : float
-        Focal length [px].
-    distance : float
-        Distance to the scene [m].
-    largest_blur : float
-        Blur at which the features are lost [px].
-    """
-
-    noise: tuple[float, float, float] = LABEL_NOISE
-    exposure: float = 1.0 / 60.0
-    pixels_per_radian: float = 520.0
-    distance: float = 0.1
-    largest_blur: float = 15.0
-
-    def blur(self, motion: ArmMotion) -> Array:
-        """Length of the blur per step, ``(n,)`` [px]: image speed times exposure."""
-        speed = np.linalg.norm(np.gradient(motion.pose[:, :3], PERIOD, axis=0), axis=1)
-        cosine = np.abs(np.sum(motion.pose[1:, 3:] * motion.pose[:-1, 3:], axis=1)).clip(max=1.0)
-        turning = np.concatenate([[0.0], 2.0 * np.arccos(cosine) / PERIOD])
-        return np.asarray(self.exposure * self.pixels_per_radian * (speed / self.distance + turning))
 
 
 @dataclass(frozen=True)
@@ -132,27 +103,21 @@ class ContactRun:
         What the arm did.
     event : ndarray (n,)
         Number of the contact that a step belongs to, -1 for none.
-    slam, fibre, fusion : ndarray (n, 3)
-        Estimated positions [m].
+    positions : dict of ndarray (n, 3)
+        Estimated positions by "slam", "fibre" and "fusion" [m].
     lost : ndarray (n,) of bool
         Where the camera had lost its features.
-    masked : ndarray (n,)
-        Number of gratings set aside.
     """
 
     motion: ArmMotion
     event: NDArray[np.int64]
-    slam: Array
-    fibre: Array
-    fusion: Array
+    positions: dict[str, Array]
     lost: NDArray[np.bool_]
-    masked: NDArray[np.int64]
 
     def errors(self) -> dict[str, Array]:
         """Distances from the true position by estimator, ``(n,)`` each [m]."""
         truth = self.motion.pose[:, :3]
-        estimates = {"slam": self.slam, "fibre": self.fibre, "fusion": self.fusion}
-        return {name: np.linalg.norm(position - truth, axis=1) for name, position in estimates.items()}
+        return {name: np.linalg.norm(position - truth, axis=1) for name, position in self.positions.items()}
 
 
 def force_profile(kind: str, time: Array) -> Array:
@@ -188,29 +153,33 @@ def simulate_contacts(
         force += contact.force * profile[:, None] * np.array([np.cos(side), np.sin(side)])
         event[(time >= start) & (time < start + EVERY / 2.0)] = number
         if contact.place == "body":
-            squeeze += _under_finger(fibre, side) * np.maximum(_touching(contact.kind, profile), 0.0)[:, None]
+            # A push lasts, a flick touches only at its very beginning.
+            touching = profile if contact.kind == "push" else np.where(profile > 0.8, profile, 0.0)
+            squeeze += _under_finger(fibre, side) * np.maximum(touching, 0.0)[:, None]
     curvature = backbone.contact_curvature(force, np.full(steps, STATIONS[contact.place]))
     return move(spiral_bending(steps), backbone, curvature), event, squeeze
 
 
-def _touching(kind: str, profile: Array) -> Array:
-    """Force of the finger itself: a push lasts, a flick touches only at its very beginning."""
-    return profile if kind == "push" else np.where(profile > 0.8, profile, 0.0)
+def _under_finger(fibre: FibreGratings, side: float) -> Array:
+    """Share of the squeeze that every grating takes, from where the finger lies on the body.
 
-
-def _under_finger(
-    fibre: FibreGratings, side: float, half_height: float = 8e-3, half_angle: float = 0.6
-) -> Array:
-    """Share of the squeeze that every grating takes, from where the finger lies on the body."""
-    height = (fibre.height - STATIONS["body"] * fibre.length) / half_height
+    The finger covers 8 mm up and down, and 0.6 rad to either side.
+    """
+    height = (fibre.height - STATIONS["body"] * fibre.length) / 8e-3
     # The finger pushes toward `side`, so it lies on the opposite side of the body.
     around = (fibre.azimuth - side) % (2.0 * np.pi) - np.pi
-    return np.maximum(0.0, 1.0 - height**2) * np.maximum(0.0, 1.0 - (around / half_angle) ** 2)
+    return np.maximum(0.0, 1.0 - height**2) * np.maximum(0.0, 1.0 - (around / 0.6) ** 2)
 
 
-def run_contacts(
-    contact: Contact, rng: np.random.Generator, camera: CameraBlur | None = None, steps: int = 4000
-) -> ContactRun:
+def motion_blur(motion: ArmMotion) -> Array:
+    """Length of the blur per step, ``(n,)`` [px]: image speed times exposure."""
+    speed = np.linalg.norm(np.gradient(motion.pose[:, :3], PERIOD, axis=0), axis=1)
+    cosine = np.abs(np.sum(motion.pose[1:, 3:] * motion.pose[:-1, 3:], axis=1)).clip(max=1.0)
+    turning = np.concatenate([[0.0], 2.0 * np.arccos(cosine) / PERIOD])
+    return np.asarray(EXPOSURE * PIXELS_PER_RADIAN * (speed / SCENE_DISTANCE + turning))
+
+
+def run_contacts(contact: Contact, rng: np.random.Generator, steps: int = 4000) -> ContactRun:
     """Estimate the pose through a run with contacts, learning on.
 
     Parameters
@@ -219,35 +188,30 @@ def run_contacts(
         What touches the arm, and how the estimator is set.
     rng : numpy.random.Generator
         Draws sides and strengths of the contacts, the bonds of the fibre, the network and all noise.
-    camera : CameraBlur, optional
-        Errors of the camera.
     steps : int
         Samples of 0.05 s.
     """
-    camera = camera or CameraBlur()
     motion, event, squeeze = simulate_contacts(contact, rng, steps)
     fibre = glue_fibre(rng)
     strength = rng.choice(TABLE_VII[contact.fibre], squeeze.shape[1])
     shifts = fibre.shift(motion.configuration, motion.elongations, rng) + strength * squeeze
-    blur = camera.blur(motion)
-    lost = (blur > camera.largest_blur) | (contact.blind & (event >= 0))
+    blur = motion_blur(motion)
+    lost = (blur > LARGEST_BLUR) | (contact.blind & (event >= 0))
     seen = motion.pose.copy()
     # Features are found less precisely along a blur; half its length is what the tracker cannot know.
-    spread = np.asarray(camera.noise) * np.sqrt(1.0 + (blur[:, None] / 4.0) ** 2)
+    spread = np.asarray(LABEL_NOISE) * np.sqrt(1.0 + (blur[:, None] / 4.0) ** 2)
     seen[:, :3] += rng.normal(0.0, 1.0, (steps, 3)) * spread
-    settings = VisualStrainSettings(
-        initial_samples=contact.initial_samples, grating_noise=fibre.noise if contact.masking else 0.0
-    )
+    mask = fibre.noise if contact.masking else 0.0
+    settings = VisualStrainSettings(initial_samples=contact.initial_samples, grating_noise=mask)
     estimator = VisualStrainEstimator(ExtremeLearningMachine(rng), settings)
-    positions, masked = np.empty((3, steps, 3)), np.zeros(steps, dtype=np.int64)
+    positions = {name: np.empty((steps, 3)) for name in ("slam", "fibre", "fusion")}
     for step in range(steps):
-        pose = None if lost[step] else seen[step]
+        found = None if lost[step] else seen[step]
         inliers = 300.0 / (1.0 + blur[step] / 4.0)
-        estimate = estimator.update(motion.time[step], shifts[step], pose, 1.0, inliers)
-        positions[:, step] = estimate.camera_pose[:3], estimate.fibre_pose[:3], estimate.pose[:3]
-        masked[step] = estimate.masked
-    slam, fibre_only, fusion = positions
-    return ContactRun(motion, event, slam, fibre_only, fusion, lost, masked)
+        estimate = estimator.update(motion.time[step], shifts[step], found, 1.0, inliers)
+        for name, pose in zip(positions, (estimate.camera_pose, estimate.fibre_pose, estimate.pose)):
+            positions[name][step] = pose[:3]
+    return ContactRun(motion, event, positions, lost)
 
 
 def summarise_contacts(run: ContactRun) -> pd.DataFrame:
@@ -256,28 +220,16 @@ def summarise_contacts(run: ContactRun) -> pd.DataFrame:
     Case 1 are the contacts of the first half of the journey, case 2 those of the second half.
     """
     middle = (run.event.max() + 1) // 2
+    cases = {1: (run.event >= 0) & (run.event < middle), 2: run.event >= middle}
     rows = []
     for name, error in run.errors().items():
-        for case, chosen in (
-            (1, (run.event >= 0) & (run.event < middle)),
-            (2, run.event >= middle),
-        ):
+        for case, chosen in cases.items():
             values = 1e3 * error[chosen]
-            rows.append(
-                {
-                    "estimator": name,
-                    "case": case,
-                    "mean_mm": values.mean(),
-                    "max_mm": values.max(),
-                    "sd_mm": values.std(),
-                }
-            )
-    return pd.DataFrame(rows)
+            rows.append((name, case, values.mean(), values.max(), values.std()))
+    return pd.DataFrame(rows, columns=["estimator", "case", "mean_mm", "max_mm", "sd_mm"])
 
 
-def sweep_contacts(
-    seed: int, contacts: dict[str, Contact], *, seeds: int = 5, steps: int = 4000
-) -> pd.DataFrame:
+def sweep_contacts(seed: int, contacts: dict[str, Contact], *, seeds: int = 5) -> pd.DataFrame:
     """Summaries of several contacts over seeds; contacts of one seed come from the same sides.
 
     Returns
@@ -287,32 +239,29 @@ def sweep_contacts(
     """
     tables = []
     for name, contact in contacts.items():
-        for number, child in enumerate(np.random.SeedSequence(seed).spawn(seeds)):
-            run = run_contacts(contact, np.random.default_rng(child), steps=steps)
+        for number, rng in enumerate(np.random.default_rng(seed).spawn(seeds)):
+            run = run_contacts(contact, rng)
             tables.append(summarise_contacts(run).assign(contact=name, seed=number))
     return pd.concat(tables, ignore_index=True)
 
 
-def touches(kinds: Sequence[str] = ("push", "flick")) -> dict[str, Contact]:
+def touches() -> dict[str, Contact]:
     """The four contacts of Tables III and IV: slow push and fast flick, on cap and body, bare fibre."""
-    force = {"push": 5.25, "flick": 5.25}
-    return {
-        f"{kind} {place}": Contact(kind, place, force=force[kind]) for kind in kinds for place in STATIONS
-    }
+    return {f"{kind} {place}": Contact(kind, place) for kind in ("push", "flick") for place in STATIONS}
 
 
 def sample_counts(counts: Sequence[int] = (450, 900, 1800)) -> dict[str, Contact]:
     """The identical flick on the cap for different numbers of initial samples (Table VI)."""
-    base = touches(("flick",))["flick cap"]
-    return {str(count): replace(base, initial_samples=count) for count in counts}
+    return {str(count): Contact("flick", "cap", initial_samples=count) for count in counts}
 
 
 def protections() -> dict[str, Contact]:
     """The slow push on the body with the view covered: bare, sheathed, and with contact masking."""
-    base = replace(touches(("push",))["push body"], blind=True)
+    bare = Contact("push", "body", blind=True)
+    covered = replace(bare, fibre="cover")
     return {
-        "bare": base,
-        "silicone cover": replace(base, fibre="cover"),
-        "bare, masked": replace(base, masking=True),
-        "silicone cover, masked": replace(base, fibre="cover", masking=True),
+        "bare": bare,
+        "silicone cover": covered,
+        "bare, masked": replace(bare, masking=True),
+        "silicone cover, masked": replace(covered, masking=True),
     }

@@ -13,14 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from soro_lib.estimators.extreme_learning_machine import ExtremeLearningMachine
-from soro_lib.papers.visual_strain_fusion.world.fibre import FibreGratings
-from soro_lib.papers.visual_strain_fusion.world.motion import (
-    ArmMotion,
-    glue_fibre,
-    move,
-    spiral,
-    spiral_bending,
-)
+from soro_lib.papers.visual_strain_fusion.world.motion import PERIOD, ArmMotion, glued_shifts, spiral
 
 Array = NDArray[np.float64]
 
@@ -88,16 +81,16 @@ class LearningRun:
         return not self.prior.max() <= DIVERGED
 
 
-def noisy_labels(motion: ArmMotion, rng: np.random.Generator, noise: Sequence[float] = LABEL_NOISE) -> Array:
-    """Camera labels ``(n, 7)``: true poses with white position noise [m, -]."""
-    labels = motion.pose.copy()
-    labels[:, :3] += rng.normal(0.0, noise, (len(labels), 3))
-    return labels
+def measure(motion: ArmMotion, rng: np.random.Generator, labels: Array | None = None) -> tuple[Array, Array]:
+    """Wavelength shifts ``(n, gratings)`` [m] of a newly glued fibre and camera labels ``(n, 7)`` [m, -].
 
-
-def read_fibre(fibre: FibreGratings, motion: ArmMotion, rng: np.random.Generator) -> Array:
-    """Noisy wavelength shifts of a motion, ``(n, gratings)`` [m]."""
-    return fibre.shift(motion.configuration, motion.elongations, rng)
+    The labels are those given, else the true poses with white position noise.
+    """
+    shifts = glued_shifts(motion, rng)
+    if labels is None:
+        labels = motion.pose.copy()
+        labels[:, :3] += rng.normal(0.0, LABEL_NOISE, (len(labels), 3))
+    return shifts, labels
 
 
 def learn_online(
@@ -105,9 +98,7 @@ def learn_online(
     shifts: Array,
     labels: Array,
     truth: Array,
-    *,
     initial: int = INITIAL_SAMPLES,
-    frozen_after: int | None = None,
 ) -> LearningRun:
     """Solve on the first samples, then predict and learn one by one.
 
@@ -121,20 +112,17 @@ def learn_online(
         Camera poses and true poses [m, -].
     initial : int
         Samples N0 of the first solution.
-    frozen_after : int, optional
-        Step from which nothing is learned any more.
     """
     hidden = network.hidden_output(shifts[:initial])
     network.fit(shifts[:initial], labels[:initial])
     steps = np.arange(initial, len(shifts))
-    prior, before, after = np.empty(len(steps)), np.empty((len(steps), 3)), np.empty((len(steps), 3))
-    trace = np.empty(len(steps))
+    prior, trace = np.empty((2, len(steps)))
+    before, after = np.empty((2, len(steps), 3))
     for row, step in enumerate(steps):
         prediction = network.predict(shifts[step])[:3]
         prior[row] = np.sqrt(np.sum((prediction - truth[step, :3]) ** 2))
-        before[row] = after[row] = labels[step, :3] - prediction
-        if frozen_after is None or step < frozen_after:
-            after[row] = network.update(shifts[step], labels[step]).posterior_error[:3]
+        before[row] = labels[step, :3] - prediction
+        after[row] = network.update(shifts[step], labels[step]).posterior_error[:3]
         trace[row] = network.trace
     condition = float(np.linalg.cond(hidden.T @ hidden))
     return LearningRun(steps, prior, before, after, trace, condition)
@@ -172,11 +160,9 @@ def compare_networks(
     """
     motion = spiral(steps)
     rows = []
-    for number, child in enumerate(np.random.SeedSequence(seed).spawn(seeds)):
-        rng = np.random.default_rng(child)
-        shifts = read_fibre(glue_fibre(rng), motion, rng)
-        seen = noisy_labels(motion, rng) if labels is None else labels
-        nodes = int(rng.integers(2**32))
+    for number, rng in enumerate(np.random.default_rng(seed).spawn(seeds)):
+        shifts, seen = measure(motion, rng, labels)
+        nodes = rng.integers(2**32)
         for name, settings in networks.items():
             network = ExtremeLearningMachine(np.random.default_rng(nodes), **settings)
             run = learn_online(network, shifts, seen, motion.pose)
@@ -191,7 +177,6 @@ def _errors(run: LearningRun) -> dict[str, float]:
         "prior_label": np.linalg.norm(run.prior_to_label, axis=1).mean(),
         "posterior_label": np.linalg.norm(run.posterior_to_label, axis=1).mean(),
         **{f"prior_{axis}": np.abs(run.prior_to_label[:, n]).mean() for n, axis in enumerate("xyz")},
-        **{f"posterior_{axis}": np.abs(run.posterior_to_label[:, n]).mean() for n, axis in enumerate("xyz")},
     }
     resolved = bool(run.resolved.all())
     return {
@@ -208,31 +193,23 @@ def _steady(error: float, run: LearningRun, resolved: bool) -> float:
     return error if resolved else float(f"{error:.{UNRESOLVED_DIGITS}g}")
 
 
-SETTINGS_COLUMNS = (
-    "prior_mean_mm",
-    "prior_max_mm",
-    "prior_label_mm",
-    "posterior_label_mm",
-    "trace",
-    "condition",
-)
-
-
 def settings_table(networks: pd.DataFrame) -> pd.DataFrame:
     """Means over the seeds of `compare_networks`, as text: six digits, or words for what rounding decides.
 
     "diverged" is an error beyond `DIVERGED`, "beyond 1e+10" a trace or a condition beyond
     `ROUNDING_LIMIT`; a network whose trace is beyond it has `UNRESOLVED_DIGITS` digits of its errors.
     """
-    means = networks.groupby("network", sort=False)[list(SETTINGS_COLUMNS)].mean()
+    errors = [f"{error}_mm" for error in ("prior_mean", "prior_max", "prior_label", "posterior_label")]
+    columns = [*errors, "trace", "condition"]
+    means = networks.groupby("network", sort=False)[columns].mean()
     digits = np.where(np.isfinite(means["trace"]), 6, UNRESOLVED_DIGITS)
-    words = {"trace": f"beyond {ROUNDING_LIMIT:.0e}", "condition": f"beyond {ROUNDING_LIMIT:.0e}"}
+    words = dict.fromkeys(("trace", "condition"), f"beyond {ROUNDING_LIMIT:.0e}")
     text = {
         column: [
             f"{value:.{count}g}" if np.isfinite(value) else words.get(column, "diverged")
             for value, count in zip(means[column], digits)
         ]
-        for column in SETTINGS_COLUMNS
+        for column in columns
     }
     return pd.DataFrame(text, index=means.index).reset_index()
 
@@ -251,25 +228,19 @@ def window_errors(
         Columns window, prior_label_mm, posterior_label_mm.
     """
     rng = np.random.default_rng(seed)
-    motion = spiral()
-    shifts = read_fibre(glue_fibre(rng), motion, rng)
-    labels = noisy_labels(motion, rng)[:, :3]
+    shifts, labels = measure(spiral(), rng)
+    labels = labels[:, :3]
     hidden = ExtremeLearningMachine(rng).hidden_output(shifts)
     rows = []
     for window in windows:
         before, after = [], []
         for step in range(max(windows), len(shifts) - 1, every):
-            weights = np.linalg.lstsq(hidden[step - window : step + 1], labels[step - window : step + 1])[0]
+            newest = slice(step - window, step + 1)
+            weights = np.linalg.lstsq(hidden[newest], labels[newest])[0]
             after.append(np.linalg.norm(hidden[step] @ weights - labels[step]))
             before.append(np.linalg.norm(hidden[step + 1] @ weights - labels[step + 1]))
-        rows.append(
-            {
-                "window": window,
-                "prior_label_mm": 1e3 * float(np.mean(before)),
-                "posterior_label_mm": 1e3 * float(np.mean(after)),
-            }
-        )
-    return pd.DataFrame(rows)
+        rows.append((window, 1e3 * np.mean(before), 1e3 * np.mean(after)))
+    return pd.DataFrame(rows, columns=["window", "prior_label_mm", "posterior_label_mm"])
 
 
 HOLD_NETWORKS: dict[str, dict[str, Any]] = {
@@ -277,78 +248,58 @@ HOLD_NETWORKS: dict[str, dict[str, Any]] = {
     "w = 0.99, bounded": {"forgetting": 0.99},
     "no forgetting": {"forgetting": 1.0},
 }
-
+"""Settings of the networks that are held still."""
 
 HOLD_START = 900
 """Step of the spiral at which `hold_still` stops: the network has followed its labels for 450 steps."""
 HOLD_STEPS = 2000
 
 
-def hold_still(
-    seed: int, *, hold_steps: int = HOLD_STEPS, networks: Mapping[str, Mapping[str, Any]] = HOLD_NETWORKS
-) -> dict[str, LearningRun]:
+def hold_still(seed: int) -> dict[str, LearningRun]:
     """Follow the spiral, stand still, then go on: forgetting with narrow excitation.
 
     While the arm stands still every sample says the same; what it says nothing about is forgotten, and the
     covariance of those directions grows exponentially unless it is bounded.
     """
-    bending = spiral_bending(3000)
-    pause = np.repeat(bending[HOLD_START : HOLD_START + 1], hold_steps, axis=0)
-    motion = move(np.concatenate([bending[:HOLD_START], pause, bending[HOLD_START:]]))
+    motion = spiral(3000, (HOLD_START, HOLD_STEPS))
     rng = np.random.default_rng(seed)
-    shifts = read_fibre(glue_fibre(rng), motion, rng)
-    labels = noisy_labels(motion, rng)
-    nodes = int(rng.integers(2**32))
-    return {
-        name: learn_online(
-            ExtremeLearningMachine(np.random.default_rng(nodes), **settings), shifts, labels, motion.pose
-        )
-        for name, settings in networks.items()
-    }
+    shifts, labels = measure(motion, rng)
+    nodes = rng.integers(2**32)
+    runs = {}
+    for name, settings in HOLD_NETWORKS.items():
+        network = ExtremeLearningMachine(np.random.default_rng(nodes), **settings)
+        runs[name] = learn_online(network, shifts, labels, motion.pose)
+    return runs
 
 
 def initial_samples(
-    seed: int, *, seeds: int = 5, counts: Sequence[int] = (250, 450, 900, 1800), horizon: int = 200
+    seed: int, *, seeds: int = 5, counts: Sequence[int] = (250, 450, 900, 1800)
 ) -> pd.DataFrame:
     """How well the first solution predicts what comes next, by the number of its samples.
 
     Returns
     -------
     pandas.DataFrame
-        Columns samples, seed, next_mm (mean error over the next steps without learning), frozen_mm (over all
+        Columns samples, seed, next_mm (mean error over the next 10 s without learning), frozen_mm (over all
         the rest of the spiral without learning), learning_mm (over the rest, learning on).
     """
     motion = spiral()
     rows = []
-    for number, child in enumerate(np.random.SeedSequence(seed).spawn(seeds)):
-        rng = np.random.default_rng(child)
-        shifts = read_fibre(glue_fibre(rng), motion, rng)
-        labels = noisy_labels(motion, rng)
-        nodes = int(rng.integers(2**32))
+    for number, rng in enumerate(np.random.default_rng(seed).spawn(seeds)):
+        shifts, labels = measure(motion, rng)
+        nodes = rng.integers(2**32)
         for count in counts:
             frozen = ExtremeLearningMachine(np.random.default_rng(nodes))
             frozen.fit(shifts[:count], labels[:count])
             error = np.linalg.norm(frozen.predict(shifts[count:])[:, :3] - motion.pose[count:, :3], axis=1)
-            learning = learn_online(
-                ExtremeLearningMachine(np.random.default_rng(nodes)),
-                shifts,
-                labels,
-                motion.pose,
-                initial=count,
-            )
-            rows.append(
-                {
-                    "samples": count,
-                    "seed": number,
-                    "next_mm": 1e3 * float(error[:horizon].mean()),
-                    "frozen_mm": 1e3 * float(error.mean()),
-                    "learning_mm": 1e3 * float(learning.prior.mean()),
-                }
-            )
-    return pd.DataFrame(rows)
+            learner = ExtremeLearningMachine(np.random.default_rng(nodes))
+            learning = learn_online(learner, shifts, labels, motion.pose, count)
+            means = error[: round(10.0 / PERIOD)].mean(), error.mean(), learning.prior.mean()
+            rows.append((count, number, *(1e3 * mean for mean in means)))
+    return pd.DataFrame(rows, columns=["samples", "seed", "next_mm", "frozen_mm", "learning_mm"])
 
 
-def blackout(seed: int, *, seeds: int = 5, seconds: Sequence[float] = (2.0, 5.0, 10.0)) -> pd.DataFrame:
+def blackout(seed: int, *, seeds: int = 5) -> pd.DataFrame:
     """Error of the fibre alone while the camera is away, on the outer spiral.
 
     Returns
@@ -358,22 +309,14 @@ def blackout(seed: int, *, seeds: int = 5, seconds: Sequence[float] = (2.0, 5.0,
     """
     motion = spiral()
     rows = []
-    for number, child in enumerate(np.random.SeedSequence(seed).spawn(seeds)):
-        rng = np.random.default_rng(child)
-        shifts = read_fibre(glue_fibre(rng), motion, rng)
-        labels = noisy_labels(motion, rng)
+    for number, rng in enumerate(np.random.default_rng(seed).spawn(seeds)):
+        shifts, labels = measure(motion, rng)
         for start in (2400, 3000, 3600):
             network = ExtremeLearningMachine(np.random.default_rng(number))
             network.fit(shifts[:start], labels[:start])
-            for length in seconds:
-                rest = slice(start, start + round(length / 0.05))
+            for length in (2.0, 5.0, 10.0):
+                rest = slice(start, start + round(length / PERIOD))
                 error = np.linalg.norm(network.predict(shifts[rest])[:, :3] - motion.pose[rest, :3], axis=1)
-                rows.append(
-                    {
-                        "seconds": length,
-                        "seed": number,
-                        "mean_mm": 1e3 * float(error.mean()),
-                        "max_mm": 1e3 * float(error.max()),
-                    }
-                )
-    return pd.DataFrame(rows).groupby(["seconds", "seed"], as_index=False).mean()
+                rows.append((length, number, 1e3 * error.mean(), 1e3 * error.max()))
+    table = pd.DataFrame(rows, columns=["seconds", "seed", "mean_mm", "max_mm"])
+    return table.groupby(["seconds", "seed"], as_index=False).mean()

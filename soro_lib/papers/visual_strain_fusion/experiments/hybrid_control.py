@@ -4,29 +4,18 @@ Each comparison runs the model-based controller for two cycles and then, from th
 sensor noise, two cycles with each reading of Eq. (29), and with the bare quadratic gain that learns nothing.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from soro_lib.controllers.hybrid import HybridController, HybridSettings
-from soro_lib.papers.visual_strain_fusion.experiments.tracking import (
-    CYCLES,
-    GAINS,
-    SENSOR_NOISE,
-    FittedPlant,
-    TrackingRun,
-    load_plant,
-    path_points,
-    track,
-)
-from soro_lib.papers.visual_strain_fusion.world.plant import ChamberParameters, PneumaticPlant
+from soro_lib.papers.visual_strain_fusion.experiments import tracking
+from soro_lib.papers.visual_strain_fusion.experiments.tracking import GAINS, FittedPlant, TrackingRun, track
+from soro_lib.papers.visual_strain_fusion.world.plant import Array, ChamberParameters, PneumaticPlant
 from soro_lib.robots.pneumatic import PneumaticArm
-
-Array = NDArray[np.float64]
 
 READINGS: dict[str, HybridSettings] = {
     "literal": HybridSettings(compensation="literal"),
@@ -36,6 +25,9 @@ READINGS: dict[str, HybridSettings] = {
     "actual motion": HybridSettings(compensation="literal", trained_on="actual"),
 }
 """Readings of Eq. (29): the printed one, the control without learning, and three others."""
+
+MEASURES = ("error", "deviation")
+"""Distance of the tip from its target, and from the closest point of the path."""
 
 
 @dataclass(frozen=True)
@@ -70,12 +62,11 @@ def compare_controllers(
     rng: np.random.Generator,
     *,
     seeds: int = 10,
-    cycles: int = CYCLES,
+    cycles: int = tracking.CYCLES,
     readings: Mapping[str, HybridSettings] = READINGS,
     plant: FittedPlant | None = None,
     maximum_step: float = 3e-3,
     spread: float = 0.0,
-    noise: float = SENSOR_NOISE,
     steps: int | None = None,
 ) -> Comparison:
     """Run the model-based controller and every reading of the compensator on one path, for all four gains.
@@ -98,13 +89,11 @@ def compare_controllers(
         Cap on the desired step [m].
     spread : float
         Spread of the plant parameters from seed to seed, as a standard deviation of logarithms [-].
-    noise : float
-        Standard deviation of the position sensor per axis [m].
     steps : int, optional
         Points of a cycle, as in `path_points`.
     """
-    plant = plant or load_plant(path)
-    points = path_points(path, plant.rotation, steps)
+    plant = plant or tracking.load_plant(path)
+    points = tracking.path_points(path, plant.rotation, steps)
     targets = np.tile(points, (cycles, 1))
     batch = (seeds, len(GAINS))
     base = HybridSettings(proportional_gain=np.array(GAINS), maximum_step=maximum_step, compensation="none")
@@ -112,22 +101,15 @@ def compare_controllers(
     robots = PneumaticPlant(arm, _vary(plant.chambers, seeds, spread, rng), batch=batch)
     # The compensators see the last steps of the model-based cycles, which is all that their windows hold.
     shared = len(targets) - max((settings.window + 1 for settings in readings.values()), default=0)
-    first = track(
-        robots,
-        HybridController(arm, base, batch),
-        targets[:shared],
-        compensating=False,
-        rng=rng,
-        noise=noise,
-    )
+    first = track(robots, HybridController(arm, base, batch), targets[:shared], compensating=False, rng=rng)
     compensated, last = {}, None
     for name, reading in readings.items():
         settings = replace(reading, proportional_gain=base.proportional_gain, maximum_step=maximum_step)
         controller, body, chance = HybridController(arm, settings, batch), deepcopy(robots), deepcopy(rng)
-        last = track(body, controller, targets[shared:], compensating=False, rng=chance, noise=noise)
-        compensated[name] = track(body, controller, targets, compensating=True, rng=chance, noise=noise)
+        last = track(body, controller, targets[shared:], compensating=False, rng=chance)
+        compensated[name] = track(body, controller, targets, compensating=True, rng=chance)
     tips = first.tip if last is None else np.concatenate([first.tip, last.tip])
-    return Comparison(path, points, TrackingRun(tips, targets, first.saturated), compensated)
+    return Comparison(path, points, TrackingRun(tips, targets), compensated)
 
 
 def _vary(
@@ -136,11 +118,10 @@ def _vary(
     """Plants that differ from seed to seed; the same for all gains of a seed."""
     if spread == 0.0:
         return chambers
-    factors = {
-        name: getattr(chambers, name) * np.exp(rng.normal(0.0, spread, (seeds, 1, 1)))
-        for name in ("gain", "resolution", "play", "dead_band", "softness", "exponent", "suction")
-    }
-    return ChamberParameters(**factors)
+    varied = {}
+    for name, value in vars(chambers).items():
+        varied[name] = value * np.exp(rng.normal(0.0, spread, (seeds, 1, 1)))
+    return ChamberParameters(**varied)
 
 
 def summarise(comparison: Comparison) -> pd.DataFrame:
@@ -151,30 +132,21 @@ def summarise(comparison: Comparison) -> pd.DataFrame:
     pandas.DataFrame
         Columns path, controller, gain, seed, error_mm, error_sd_mm, error_percent (of 3 mm),
         deviation_mm, deviation_sd_mm, deviation_percent (mean of deviation over distance of the path point
-        from the start), saturated.
+        from the start).
     """
     radius = np.linalg.norm(comparison.model.target, axis=-1)[:, None, None]
-    rows = []
+    tables = []
     for name, run in comparison.runs.items():
         error, deviation = 1e3 * run.error, 1e3 * run.deviation(comparison.points)
-        percent = 100.0 * (deviation / (1e3 * radius)).mean(axis=0)
-        for seed, column in np.ndindex(error.shape[1:]):
-            rows.append(
-                {
-                    "path": comparison.path,
-                    "controller": name,
-                    "gain": GAINS[column],
-                    "seed": seed,
-                    "error_mm": error[:, seed, column].mean(),
-                    "error_sd_mm": error[:, seed, column].std(),
-                    "error_percent": 100.0 * error[:, seed, column].mean() / 3.0,
-                    "deviation_mm": deviation[:, seed, column].mean(),
-                    "deviation_sd_mm": deviation[:, seed, column].std(),
-                    "deviation_percent": percent[seed, column],
-                    "saturated": run.saturated,
-                }
-            )
-    return pd.DataFrame(rows)
+        seed, column = np.indices(error.shape[1:]).reshape(2, -1)
+        keys = {"path": comparison.path, "controller": name, "gain": np.array(GAINS)[column], "seed": seed}
+        table = pd.DataFrame(keys)
+        for measure, values, whole in zip(MEASURES, (error, deviation), (3.0, 1e3 * radius)):
+            table[f"{measure}_mm"] = values.mean(axis=0).ravel()
+            table[f"{measure}_sd_mm"] = values.std(axis=0).ravel()
+            table[f"{measure}_percent"] = 100.0 * (values / whole).mean(axis=0).ravel()
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
 
 
 def improvements(summary: pd.DataFrame) -> pd.DataFrame:
@@ -182,17 +154,11 @@ def improvements(summary: pd.DataFrame) -> pd.DataFrame:
     keys = ["path", "gain", "seed"]
     model = summary[summary.controller == "model"]
     table = summary[summary.controller != "model"].merge(model, on=keys, suffixes=("", "_model"))
-    for measure in ("error", "deviation"):
+    better = table[[*keys, "controller"]].copy()
+    for measure in MEASURES:
         reduction = 1.0 - table[f"{measure}_mm"] / table[f"{measure}_mm_model"]
-        table[f"{measure}_improvement_percent"] = 100.0 * reduction
-    return table[[*keys, "controller", "error_improvement_percent", "deviation_improvement_percent"]]
-
-
-def interval(values: Sequence[float], rng: np.random.Generator, resamples: int = 2000) -> tuple[float, float]:
-    """Bootstrap interval (95 %) of the mean over seeds."""
-    means = rng.choice(np.asarray(values, dtype=float), (resamples, len(values))).mean(axis=1)
-    low, high = np.percentile(means, [2.5, 97.5])
-    return float(low), float(high)
+        better[f"{measure}_improvement_percent"] = 100.0 * reduction
+    return better
 
 
 def learning_against_no_learning(summary: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
@@ -206,24 +172,17 @@ def learning_against_no_learning(summary: pd.DataFrame, rng: np.random.Generator
         learning with its 95 % interval, and the share of the improvement that the gain alone has [%].
     """
     rows = []
-    for measure in ("error", "deviation"):
+    for measure in MEASURES:
         for (path, gain), group in summary.groupby(["path", "gain"], sort=False):
             wide = group.pivot(index="seed", columns="controller", values=f"{measure}_mm")
-            difference = wide["literal"] - wide["no learning"]
-            low, high = interval(difference.tolist(), rng)
-            gained = (wide["model"] - wide["no learning"]) / (wide["model"] - wide["literal"])
-            rows.append(
-                {
-                    "measure": measure,
-                    "path": path,
-                    "gain": gain,
-                    "model_mm": wide["model"].mean(),
-                    "with_learning_mm": wide["literal"].mean(),
-                    "no_learning_mm": wide["no learning"].mean(),
-                    "difference_mm": difference.mean(),
-                    "difference_low_mm": low,
-                    "difference_high_mm": high,
-                    "gain_alone_percent": 100.0 * gained.mean(),
-                }
-            )
-    return pd.DataFrame(rows)
+            model, literal, bare = wide["model"], wide["literal"], wide["no learning"]
+            difference = literal - bare
+            resampled = rng.choice(difference.to_numpy(), (2000, len(difference))).mean(axis=1)
+            interval = np.percentile(resampled, [2.5, 97.5])
+            gained = 100.0 * ((model - bare) / (model - literal)).mean()
+            means = (values.mean() for values in (model, literal, bare, difference))
+            rows.append((measure, path, gain, *means, *interval, gained))
+    means_mm = ["model_mm", "with_learning_mm", "no_learning_mm", "difference_mm"]
+    interval_mm = ["difference_low_mm", "difference_high_mm"]
+    columns = ["measure", "path", "gain", *means_mm, *interval_mm, "gain_alone_percent"]
+    return pd.DataFrame(rows, columns=columns)

@@ -4,15 +4,12 @@ import tomllib
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from soro_lib import paths
 from soro_lib.controllers.hybrid import HybridController
-from soro_lib.papers.visual_strain_fusion.world.plant import ChamberParameters, PneumaticPlant
+from soro_lib.papers.visual_strain_fusion.world.plant import Array, ChamberParameters, PneumaticPlant
 from soro_lib.project import data_directory
-
-Array = NDArray[np.float64]
 
 GAINS = (0.04, 0.06, 0.08, 0.10)
 RADIUS = 0.030
@@ -63,7 +60,7 @@ class FittedPlant:
 
 
 def load_plant(path: str, hypothesis: str = "cap_3mm") -> FittedPlant:
-    """Plant that was fitted to the model-based columns of the tables, see `soro_lib.calibrations`.
+    """Plant that was fitted to the model-based columns of the tables, see `calibration`.
 
     Parameters
     ----------
@@ -97,13 +94,10 @@ class TrackingRun:
         True tip position [m].
     target : ndarray (steps, 2) or (steps, ..., 2)
         Target position, common or one per member of the batch [m].
-    saturated : float
-        Share of the steps in which a chamber length met its limit.
     """
 
     tip: Array
     target: Array
-    saturated: float
 
     @property
     def error(self) -> Array:
@@ -130,7 +124,6 @@ def track(
     *,
     compensating: bool,
     rng: np.random.Generator | None = None,
-    noise: float = SENSOR_NOISE,
 ) -> TrackingRun:
     """Let a batch of plants follow a moving target, from wherever they stand.
 
@@ -146,17 +139,11 @@ def track(
         Whether the compensator acts.
     rng : numpy.random.Generator, optional
         Draws the noise of the position sensor; none without it.
-    noise : float
-        Its standard deviation per axis [m].
     """
     tips = np.empty((len(targets), *plant.motors.shape[:-1], 2))
-    saturated = 0.0
     tip = plant.tip[..., :2]
     for step, target in enumerate(targets):
-        measured = tip if rng is None else tip + rng.normal(0.0, noise, tip.shape)
-        result = controller.update(measured, target, plant.motors, compensating)
-        plant.drive(result.actuation)
-        tip = plant.tip[..., :2]
-        tips[step] = tip
-        saturated += float(result.saturated.mean()) / len(targets)
-    return TrackingRun(tips, targets, saturated)
+        measured = tip if rng is None else tip + rng.normal(0.0, SENSOR_NOISE, tip.shape)
+        plant.drive(controller.update(measured, target, plant.motors, compensating).actuation)
+        tips[step] = tip = plant.tip[..., :2]
+    return TrackingRun(tips, targets)

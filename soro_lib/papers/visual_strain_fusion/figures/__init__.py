@@ -1,1 +1,1 @@
-"""Figures of the visual-strain paper, one function per figure, named after the paper's numbers."""
+"""Figures, one function per figure, named after the paper's numbers; they draw, and compute no results."""

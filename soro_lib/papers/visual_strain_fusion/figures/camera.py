@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from soro_lib.papers.visual_strain_fusion.experiments.fusion_runs import SEEN, TRUE, camera_errors
 from soro_lib.replication.plotting import (
     COLORS,
     ESTIMATE,
@@ -21,8 +22,7 @@ from soro_lib.replication.plotting import (
     legend,
     new_figure,
 )
-
-Image = NDArray[np.uint8]
+from soro_lib.sensing.camera import Image
 
 CAMERA: dict[str, Any] = {"color": COLORS["orange"], "linewidth": 1.0, "zorder": 2}
 FIBRE: dict[str, Any] = {"color": COLORS["green"], "linewidth": 1.0, "zorder": 3}
@@ -30,12 +30,7 @@ FUSED: dict[str, Any] = {**ESTIMATE, "linewidth": 1.1}
 """The camera is the measurement, the fused pose the estimate; the fibre has a colour of its own."""
 
 PHASES = {
-    "moving obstacles": {
-        1: "undisturbed",
-        2: "resting hand",
-        3: "moving hand",
-        4: "covered lens",
-    },
+    "moving obstacles": {1: "undisturbed", 2: "resting hand", 3: "moving hand", 4: "covered lens"},
     "varying light": {1: "ordinary light", 2: "weak light or darkness", 3: "moving lamp"},
 }
 """Numbers of the conditions in the paper's Figs. 6(a) and 7(a)."""
@@ -43,12 +38,15 @@ PHASES = {
 PHASE_COLORS = {2: "#f3e3c2", 3: "#dbe7f3", 4: "#e9d3dd"}
 CIRCLED = {1: "①", 2: "②", 3: "③", 4: "④"}
 
+NAMES = {"camera": "camera (SLAM)", "fibre": "fibre (F-emp)", "fused": "fusion"}
+"""What the paper calls the estimates."""
+
 
 def fig05a_camera_errors(frames: pd.DataFrame) -> Figure:
     """Errors of the camera's position along x, y and z over an undisturbed flight, with their means."""
     figure, rows = new_figure(PAGE_WIDTH, 4.2, 3, 1, sharex=True, sharey=True)
-    for axes, axis, color in zip(rows, "xyz", ("blue", "orange", "green")):
-        error = (frames[f"{axis}_mm"] - frames[f"true_{axis}_mm"]).abs()
+    errors = np.abs(camera_errors(frames)).T
+    for axes, axis, color, error in zip(rows, "xyz", ("blue", "orange", "green"), errors):
         axes.plot(frames["time_s"], error, color=COLORS[color], linewidth=0.8)
         axes.axhline(error.mean(), color=COLORS["black"], linewidth=1.2, linestyle="--")
         axes.annotate(
@@ -66,8 +64,7 @@ def fig05b_trajectories(frames: pd.DataFrame) -> Figure:
     figure, axes = new_figure(PAGE_WIDTH, 3.4)
     axes.remove()
     figure.set_layout_engine("constrained", wspace=0.1)
-    truth = frames[["true_x_mm", "true_y_mm", "true_z_mm"]].to_numpy()
-    seen = frames[["x_mm", "y_mm", "z_mm"]].to_numpy()[::12]
+    truth, seen = frames[TRUE].to_numpy(), frames[SEEN].to_numpy()[::12]
     space = figure.add_subplot(1, 2, 1, projection="3d")
     space.plot(*truth.T, **{**TRUTH, "linewidth": 1.0})
     space.plot(*seen.T, **{**MEASUREMENT, "markersize": 2.5})
@@ -86,8 +83,12 @@ def fig05b_trajectories(frames: pd.DataFrame) -> Figure:
 
 def fig05c_stitched(front: Image, side: Image) -> Figure:
     """Pictures of a flight, hung in space at the estimated poses: from the front and from the side."""
-    figure, columns = new_figure(PAGE_WIDTH, 3.5, 1, 2, width_ratios=(1.0, 1.25))
-    for axes, image, title in zip(columns, (front, side), ("front", "side")):
+    return _pictures({"front": front, "side": side}, 3.5, width_ratios=(1.0, 1.25))
+
+
+def _pictures(images: Mapping[str, Image], height: float, **options: Any) -> Figure:
+    figure, columns = new_figure(PAGE_WIDTH, height, 1, 2, **options)
+    for axes, (title, image) in zip(columns, images.items()):
         _show(axes, _trimmed(image), title)
     return figure
 
@@ -115,8 +116,7 @@ def draw_view(axes: Axes, view: Any, disturbance: str) -> None:
     other, inlier = view.frame.other_pixels, view.frame.inlier_pixels
     axes.plot(*other.T, linestyle="none", marker="x", markersize=2.2, markeredgewidth=0.5, color="white")
     axes.plot(*inlier.T, linestyle="none", marker="o", markersize=2.2, markeredgewidth=0, color="#3cff6b")
-    state = f"{view.frame.inliers} of {view.frame.features} features fit" if view.frame.tracked else "lost"
-    axes.set_xlabel(state, fontsize=8)
+    axes.set_xlabel(view.found, fontsize=8)
 
 
 def fig06b_deviations(run: pd.DataFrame, reach: float) -> Figure:
@@ -127,9 +127,6 @@ def fig06b_deviations(run: pd.DataFrame, reach: float) -> Figure:
 def fig07b_deviations(run: pd.DataFrame, reach: float) -> Figure:
     """Error of camera, fibre and fusion in varying light."""
     return _deviations(run, reach, {"camera": CAMERA, "fibre": FIBRE, "fused": FUSED}, "varying light")
-
-
-NAMES = {"camera": "camera (SLAM)", "fibre": "fibre (F-emp)", "fused": "fusion", "filter": "filter"}
 
 
 def _deviations(
@@ -147,8 +144,8 @@ def _deviations(
     rows[0].set_ylim(0, max(30, 1.1 * float(run["camera_mm"].max())))
     share = rows[0].secondary_yaxis("right", functions=(lambda e: 100 * e / reach, lambda p: p * reach / 100))
     share.set_yscale("symlog", linthresh=200 / reach, linscale=1.2)
-    share.minorticks_off()
     share.set_ylabel(f"of {reach:.1f} mm [%]")
+    share.minorticks_off()
     share.set_yticks([0, 2, 5, 10, 20, 50], ["0", "2", "5", "10", "20", "50"])
     rows[1].set_yscale("log")
     label_axes(rows[0], y="error [mm]", title=disturbance.capitalize())
@@ -175,10 +172,9 @@ def _shade_phases(axes: Axes, run: pd.DataFrame) -> None:
 def fig06c_trajectories(run: pd.DataFrame, truth: NDArray[np.float64]) -> Figure:
     """Paths of the tip from above, by camera, fibre and fusion, while the view is disturbed."""
     figure, columns = new_figure(PAGE_WIDTH, 2.9, 1, 3, sharex=True, sharey=True)
-    disturbed = run["time_s"].to_numpy() >= 100
+    part = run[run["time_s"] >= 100]
     for axes, (name, style) in zip(columns, (("fused", FUSED), ("camera", CAMERA), ("fibre", FIBRE))):
-        axes.plot(*(1e3 * truth[disturbed, :2].T), **{**TRUTH, "linewidth": 0.8}, label="true path")
-        part = run[disturbed]
+        axes.plot(*(1e3 * truth[part.index, :2].T), **{**TRUTH, "linewidth": 0.8}, label="true path")
         axes.plot(part[f"{name}_x_mm"], part[f"{name}_y_mm"], **{**style, "zorder": 4, "alpha": 0.85})
         axes.set_aspect("equal")
         label_axes(axes, "x [mm]", title=NAMES[name])
@@ -188,10 +184,7 @@ def fig06c_trajectories(run: pd.DataFrame, truth: NDArray[np.float64]) -> Figure
 
 def fig08_reconstructions(obstacles: Image, light: Image) -> Figure:
     """Pictures of the disturbed flights, hung in space at the fused poses."""
-    figure, columns = new_figure(PAGE_WIDTH, 3.7, 1, 2)
-    _show(columns[0], _trimmed(obstacles), "(a) moving obstacles")
-    _show(columns[1], _trimmed(light), "(b) varying light")
-    return figure
+    return _pictures({"(a) moving obstacles": obstacles, "(b) varying light": light}, 3.7)
 
 
 def fusion_compared(errors: pd.DataFrame, windows: Sequence[str], labels: Mapping[str, str]) -> Figure:
@@ -200,16 +193,12 @@ def fusion_compared(errors: pd.DataFrame, windows: Sequence[str], labels: Mappin
     colors = ("orange", "green", "sky", "blue", "purple")
     width = 0.8 / len(labels)
     for axes, (statistic, title) in zip(columns, (("rmse_mm", "root mean square"), ("max_mm", "largest"))):
+        samples = errors.groupby(["estimate", "window"])[statistic]
+        middle, low, high = samples.mean(), samples.quantile(0.025), samples.quantile(0.975)
         for index, (name, label) in enumerate(labels.items()):
-            samples = [
-                errors[(errors["window"] == window) & (errors["estimate"] == name)][statistic]
-                for window in windows
-            ]
-            middle = np.array([values.mean() for values in samples])
-            ends = np.array([values.quantile([0.025, 0.975]).to_numpy() for values in samples]).T
             place = np.arange(len(windows)) + (index - (len(labels) - 1) / 2) * width
-            axes.bar(place, middle, 0.92 * width, color=COLORS[colors[index]], label=label)
-            axes.vlines(place, *ends, color=COLORS["black"], linewidth=1.0)
+            axes.bar(place, middle[name][windows], 0.92 * width, color=COLORS[colors[index]], label=label)
+            axes.vlines(place, low[name][windows], high[name][windows], color=COLORS["black"], linewidth=1.0)
         axes.set_xticks(np.arange(len(windows)), windows, rotation=15, ha="right")
         axes.set_yscale("log")
         axes.minorticks_off()
@@ -223,23 +212,20 @@ def error_and_confidence(frames: pd.DataFrame) -> Figure:
     """Error of the tracked frames against what the camera says of itself: inliers' error, inliers, spread."""
     figure, columns = new_figure(PAGE_WIDTH, 2.7, 1, 3, sharey=True)
     tracked = frames[frames["tracked"] > 0]
-    error = np.linalg.norm(
-        tracked[["x_mm", "y_mm", "z_mm"]].to_numpy()
-        - tracked[["true_x_mm", "true_y_mm", "true_z_mm"]].to_numpy(),
-        axis=1,
+    error = np.linalg.norm(camera_errors(tracked), axis=1)
+    signs = (
+        ("inlier_error_px", "mean error of the inliers [px]", ()),
+        ("inliers", "inliers", (20, 50, 100, 200, 400)),
+        ("spread_mm", "spread by the Jacobian [mm]", (0.1, 0.2, 0.5, 1.0, 2.0)),
     )
-    for axes, column, label in zip(
-        columns,
-        ("inlier_error_px", "inliers", "spread_mm"),
-        ("mean error of the inliers [px]", "inliers", "spread by the Jacobian [mm]"),
-    ):
+    for axes, (column, label, ticks) in zip(columns, signs):
         axes.plot(tracked[column], error, **{**MEASUREMENT, "markersize": 2.0, "alpha": 0.35})
         axes.set_yscale("log")
         label_axes(axes, x=label)
-    for axes, ticks in zip(columns[1:], ((20, 50, 100, 200, 400), (0.1, 0.2, 0.5, 1.0, 2.0))):
-        axes.set_xscale("log")
-        axes.minorticks_off()
-        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        if ticks:
+            axes.set_xscale("log")
+            axes.minorticks_off()
+            axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     label_axes(columns[0], y="error [mm]")
     return figure
 
@@ -259,28 +245,29 @@ def explorer_plots(run: pd.DataFrame, shifts: NDArray[np.float64], step: int, tr
         True tip positions [m].
     """
     figure, cells = new_figure(PAGE_WIDTH, 4.6, 2, 2, width_ratios=(1.6, 1.0))
+    (errors, paths), (weights, gratings) = cells
     now = float(run["time_s"].iloc[step])
     near = run[run["time_s"].between(now - 15, now + 15)]
     for name, style in (("camera", CAMERA), ("fibre", FIBRE), ("fused", FUSED)):
-        cells[0, 0].plot(near["time_s"], near[f"{name}_mm"], **style, label=NAMES[name])
-        path = near[[f"{name}_x_mm", f"{name}_y_mm"]].to_numpy()
-        cells[0, 1].plot(*path.T, **style)
-        cells[0, 1].plot(*run[[f"{name}_x_mm", f"{name}_y_mm"]].iloc[step], marker="o", color=style["color"])
-    cells[0, 0].set_ylim(0, max(3.0, 1.1 * float(near["camera_mm"].max())))
-    label_axes(cells[0, 0], y="error [mm]", title=f"{now:.2f} s")
-    legend(cells[0, 0], loc="upper left", ncols=3)
-    cells[0, 1].plot(*(1e3 * truth[near.index, :2].T), **{**TRUTH, "linewidth": 0.9})
-    cells[0, 1].set_aspect("equal", adjustable="datalim")
-    label_axes(cells[0, 1], "x [mm]", "y [mm]")
-    cells[1, 0].fill_between(near["time_s"], near["weight"], color=COLORS["green"], alpha=0.4, linewidth=0)
-    cells[1, 0].set_ylim(0, 1)
-    label_axes(cells[1, 0], "time [s]", "weight of the fibre")
-    for axes in cells[:, 0]:
+        errors.plot(near["time_s"], near[f"{name}_mm"], **style, label=NAMES[name])
+        path = [f"{name}_x_mm", f"{name}_y_mm"]
+        paths.plot(*near[path].to_numpy().T, **style)
+        paths.plot(*run[path].iloc[step], marker="o", color=style["color"])
+    errors.set_ylim(0, max(3.0, 1.1 * float(near["camera_mm"].max())))
+    label_axes(errors, y="error [mm]", title=f"{now:.2f} s")
+    legend(errors, loc="upper left", ncols=3)
+    paths.plot(*(1e3 * truth[near.index, :2].T), **{**TRUTH, "linewidth": 0.9})
+    paths.set_aspect("equal", adjustable="datalim")
+    label_axes(paths, "x [mm]", "y [mm]")
+    weights.fill_between(near["time_s"], near["weight"], color=COLORS["green"], alpha=0.4, linewidth=0)
+    weights.set_ylim(0, 1)
+    label_axes(weights, "time [s]", "weight of the fibre")
+    for axes in (errors, weights):
         axes.axvline(now, color=COLORS["black"], linewidth=0.8)
-    cells[1, 1].bar(np.arange(1, shifts.shape[1] + 1), 1e12 * shifts[step], color=COLORS["green"])
+    gratings.bar(np.arange(1, shifts.shape[1] + 1), 1e12 * shifts[step], color=COLORS["green"])
     largest = 1e12 * float(np.abs(shifts).max())
-    cells[1, 1].set_ylim(-largest, largest)
-    label_axes(cells[1, 1], "grating", "shift [pm]")
+    gratings.set_ylim(-largest, largest)
+    label_axes(gratings, "grating", "shift [pm]")
     return figure
 
 
@@ -298,11 +285,9 @@ def _show(axes: Axes, image: Image, title: str) -> None:
     if image.ndim == 3:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)
     axes.imshow(image, cmap="gray", vmin=0, vmax=255)
-    axes.set_xticks([])
-    axes.set_yticks([])
+    axes.set(xticks=[], yticks=[])
     axes.grid(visible=False)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    axes.spines[:].set_visible(False)
     axes.set_title(title, fontsize=8)
 
 

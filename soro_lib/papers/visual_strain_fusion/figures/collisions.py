@@ -1,7 +1,5 @@
 """Figures of pushes and flicks (Wang et al., Fig. 13, Tables III, IV and VI)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -21,30 +19,29 @@ STYLES: dict[str, dict[str, Any]] = {
 
 def fig13a_push_on_cap(run: ContactRun) -> Figure:
     """Draw two slow pushes on the cap: trajectories of the four sensings, and errors."""
-    return _draw_contacts(run, (2, 7))
+    return _draw_contacts(run)
 
 
 def fig13b_push_on_body(run: ContactRun) -> Figure:
     """Draw two slow pushes on the body."""
-    return _draw_contacts(run, (2, 7))
+    return _draw_contacts(run)
 
 
 def flick_on_cap(run: ContactRun) -> Figure:
     """Draw two fast flicks on the cap, where the camera loses its features."""
-    return _draw_contacts(run, (2, 7))
+    return _draw_contacts(run)
 
 
-def _draw_contacts(run: ContactRun, events: tuple[int, int]) -> Figure:
+def _draw_contacts(run: ContactRun) -> Figure:
+    """Draw the third and the eighth contact."""
     figure, axes = new_figure(PAGE_WIDTH, 4.6, rows=2, columns=2, height_ratios=(1.5, 1.0))
-    estimates = {"slam": run.slam, "fibre": run.fibre, "fusion": run.fusion}
-    for column, event in enumerate(events):
+    errors = run.errors()
+    for (path, error), event in zip(axes.T, (2, 7)):
         steps = np.flatnonzero(run.event == event)
         steps = np.arange(steps[0] - 20, steps[-1] + 20)
-        path, error = axes[:, column]
-        for name, position in estimates.items():
+        for name, position in run.positions.items():
             path.plot(*(1e3 * position[steps, :2]).T, linewidth=1.0, **STYLES[name])
-            distance = np.linalg.norm(position[steps] - run.motion.pose[steps, :3], axis=1)
-            error.plot(PERIOD * steps, 1e3 * distance, linewidth=1.0, color=STYLES[name]["color"])
+            error.plot(PERIOD * steps, 1e3 * errors[name][steps], linewidth=1.0, color=STYLES[name]["color"])
         path.plot(*(1e3 * run.motion.pose[steps, :2]).T, **{**TRUTH, "linewidth": 1.0}, label="truth")
         high = error.get_ylim()[1]
         lost = run.lost[steps]

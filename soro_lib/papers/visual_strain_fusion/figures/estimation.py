@@ -1,7 +1,5 @@
 """Figures of the fibre and its learning estimator (Wang et al., Figs. 2, 3, Sec. IV-C)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 
@@ -22,14 +20,12 @@ def fig03_strain_along_the_helix(fibre: FibreGratings) -> Figure:
     """Draw the strain of the gratings: growing bend in one direction, one bend in four directions."""
     figure, axes = new_figure(PAGE_WIDTH, 3.0, columns=2, sharey=True)
     backbone = BackboneParameters()
-    position = 1e3 * fibre.position
-    for color, angle in zip(SERIES, (20.0, 40.0, 60.0)):
-        strain = fibre.axial_strain(backbone.shape(np.deg2rad([angle, 0.0]), fibre.length))
-        axes[0].plot(position, 100 * strain, marker=".", color=color, label=f"bend {angle:.0f} deg")
-    for color, heading in zip(SERIES, (0.0, 90.0, 180.0, 270.0)):
-        bending = np.deg2rad(45.0) * np.array([np.cos(np.deg2rad(heading)), np.sin(np.deg2rad(heading))])
-        strain = fibre.axial_strain(backbone.shape(bending, fibre.length))
-        axes[1].plot(position, 100 * strain, marker=".", color=color, label=f"toward {heading:.0f} deg")
+    bends = [(0, angle, 0, f"bend {angle} deg") for angle in (20, 40, 60)]
+    bends += [(1, 45, heading, f"toward {heading} deg") for heading in (0, 90, 180, 270)]
+    for color, (column, angle, heading, label) in zip((*SERIES[:3], *SERIES[:4]), bends):
+        toward = np.array([np.cos(np.deg2rad(heading)), np.sin(np.deg2rad(heading))])
+        strain = fibre.axial_strain(backbone.shape(np.deg2rad(angle) * toward, fibre.length))
+        axes[column].plot(1e3 * fibre.position, 100 * strain, marker=".", color=color, label=label)
     label_axes(axes[0], "place along the fibre [mm]", "axial strain of the skin [%]", title="Same plane")
     label_axes(axes[1], "place along the fibre [mm]", title="Same bend, 45 deg")
     axes[0].set_ylim(-14.0, 20.0)
@@ -98,24 +94,21 @@ def elm_blow_up(runs: Mapping[str, LearningRun], hold: tuple[int, int]) -> Figur
 def elm_samples_and_blackouts(samples: pd.DataFrame, blackouts: pd.DataFrame) -> Figure:
     """Draw what the first samples are worth, and how long the fibre holds without the camera."""
     figure, axes = new_figure(PAGE_WIDTH, 3.0, columns=2)
-    styles = {
-        "next_mm": ("next 10 s, not learning", COLORS["orange"], "o"),
-        "frozen_mm": ("rest of the spiral, not learning", COLORS["vermillion"], "s"),
-        "learning_mm": ("rest of the spiral, learning", COLORS["blue"], "D"),
+    by_count = {
+        "next_mm": ("next 10 s, not learning", "orange", "o"),
+        "frozen_mm": ("rest of the spiral, not learning", "vermillion", "s"),
+        "learning_mm": ("rest of the spiral, learning", "blue", "D"),
     }
-    by_count = samples.groupby("samples")
-    for column, (label, color, marker) in styles.items():
-        axes[0].plot(by_count[column].mean(), color=color, marker=marker, markersize=4, label=label)
-        axes[0].plot(samples.samples, samples[column], ".", color=color, alpha=0.4, markersize=3)
-    axes[0].set_yscale("log")
-    axes[0].set_xticks(sorted(samples.samples.unique()))
-    label_axes(axes[0], "initial samples N0", "mean error to the truth [mm]")
-    legend(axes[0], fontsize=7)
-    by_length = blackouts.groupby("seconds")
-    for column, color, marker in (("mean_mm", COLORS["blue"], "D"), ("max_mm", COLORS["vermillion"], "s")):
-        axes[1].plot(by_length[column].mean(), color=color, marker=marker, markersize=4, label=column[:-3])
-        axes[1].plot(blackouts.seconds, blackouts[column], ".", color=color, alpha=0.4, markersize=3)
+    by_length = {"mean_mm": ("mean", "blue", "D"), "max_mm": ("max", "vermillion", "s")}
+    panels = ((axes[0], samples, "samples", by_count), (axes[1], blackouts, "seconds", by_length))
+    for panel, table, key, styles in panels:
+        for column, (label, color, marker) in styles.items():
+            mean = table.groupby(key)[column].mean()
+            panel.plot(mean, color=COLORS[color], marker=marker, markersize=4, label=label)
+            panel.plot(table[key], table[column], ".", color=COLORS[color], alpha=0.4, markersize=3)
+        legend(panel, fontsize=7)
+    axes[0].set(yscale="log", xticks=sorted(samples.samples.unique()))
     axes[1].set_ylim(bottom=0)
+    label_axes(axes[0], "initial samples N0", "mean error to the truth [mm]")
     label_axes(axes[1], "time without camera [s]", "error of the fibre alone [mm]")
-    legend(axes[1], fontsize=7)
     return figure

@@ -1,1 +1,1 @@
-"""The simulated arm, its fibre, its camera's surroundings and how it is moved."""
+"""The simulated arm, its fibre, its camera's surroundings and how it is moved; nothing estimates here."""

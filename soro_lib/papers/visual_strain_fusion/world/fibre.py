@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import not_negative, positive
+
 Array = NDArray[np.float64]
 
 SHIFT_PER_STRAIN = 0.78 * 1550e-9
@@ -58,15 +60,12 @@ class FibreGratings:
     def __post_init__(self) -> None:
         """Check the values; the error names the field and its bound."""
         for name in ("gratings", "spacing", "pitch", "radius", "length", "transfer"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise ValueError(f"{name} must be finite and above 0, got {getattr(self, name)}")
+            positive(name, getattr(self, name))
         for name in ("first", "noise", "ballooning"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise ValueError(f"{name} must be finite and not negative, got {getattr(self, name)}")
-        bond_gain = np.asarray(self.bond_gain, dtype=float)
-        if bond_gain.shape != (self.gratings,) or not (np.isfinite(bond_gain) & (bond_gain > 0)).all():
-            raise ValueError(f"bond_gain must be {self.gratings} finite values above 0, got {bond_gain}")
-        object.__setattr__(self, "bond_gain", bond_gain)
+            not_negative(name, getattr(self, name))
+        gain = self.bond_gain
+        if gain.shape != (self.gratings,) or not (np.isfinite(gain) & (gain > 0)).all():
+            raise ValueError(f"bond_gain must be {self.gratings} finite values above 0, got {gain}")
         if self.height[-1] > self.length:
             raise ValueError(f"the last grating lies at {self.height[-1]:.4f} m, beyond length {self.length}")
 

@@ -3,16 +3,14 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from soro_lib import paths
 from soro_lib.arcs import chain_transform
 from soro_lib.papers.visual_strain_fusion.world.fibre import FibreGratings, bond_spread
-from soro_lib.papers.visual_strain_fusion.world.plant import BackboneParameters
+from soro_lib.papers.visual_strain_fusion.world.plant import Array, BackboneParameters
 from soro_lib.robots.pneumatic import PneumaticArm
-
-Array = NDArray[np.float64]
 
 PERIOD = 0.05
 """Step of control and learning [s]."""
@@ -90,9 +88,14 @@ def move(
     return ArmMotion(time, elongations, configuration, tip_pose(configuration))
 
 
-def spiral(steps: int = 4000) -> ArmMotion:
-    """Predefined spiral of Secs. IV-B and IV-C: 200 s, about 40 mm from the start at its end."""
-    return move(spiral_bending(steps))
+def spiral(steps: int = 4000, hold: tuple[int, int] = (0, 0)) -> ArmMotion:
+    """Predefined spiral of Secs. IV-B and IV-C: 200 s, about 40 mm from the start at its end.
+
+    With `hold`, the arm stands still from one step on for so many steps.
+    """
+    bending = spiral_bending(steps)
+    pause = np.repeat(bending[hold[0] : hold[0] + 1], hold[1], axis=0)
+    return move(np.concatenate([bending[: hold[0]], pause, bending[hold[0] :]]))
 
 
 def glue_fibre(
@@ -113,3 +116,8 @@ def glue_fibre(
     motion = spiral(400)
     reached = np.abs(fibre.shift(motion.configuration, motion.elongations)).max()
     return replace(fibre, transfer=fibre.transfer * largest_shift / reached)
+
+
+def glued_shifts(motion: ArmMotion, rng: np.random.Generator) -> Array:
+    """Noisy wavelength shifts ``(n, gratings)`` [m] of a motion by a fibre that is glued for it."""
+    return glue_fibre(rng).shift(motion.configuration, motion.elongations, rng)

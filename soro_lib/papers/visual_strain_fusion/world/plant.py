@@ -21,7 +21,7 @@ REFERENCE_STRETCH = 0.005
 """Stretch at which the gain of a chamber is stated, whatever its exponent [m]."""
 
 
-def _check_fields(parameters: Any, bounds: dict[str, tuple[float, float]]) -> None:
+def _check_fields(parameters: Any, **bounds: tuple[float, float]) -> None:
     for name, (low, high) in bounds.items():
         value = np.asarray(getattr(parameters, name), dtype=float)
         if not (np.isfinite(value).all() and (value >= low).all() and (value <= high).all()):
@@ -60,27 +60,17 @@ class ChamberParameters:
 
     def __post_init__(self) -> None:
         """Check the values; the error names the field and its bounds."""
-        _check_fields(
-            self,
-            {
-                "gain": (1e-3, 1e3),
-                "resolution": (0.0, 1e-2),
-                "play": (0.0, 1e-2),
-                "dead_band": (0.0, 1e-2),
-                "softness": (0.0, 1e-2),
-                "exponent": (0.1, 10.0),
-                "suction": (0.0, 10.0),
-            },
-        )
+        length = (0.0, 1e-2)
+        _check_fields(self, gain=(1e-3, 1e3), exponent=(0.1, 10.0), suction=(0.0, 10.0))
+        _check_fields(self, resolution=length, play=length, dead_band=length, softness=length)
 
     def stretch(self, displacement: ArrayLike) -> Array:
         """Elongation of a chamber for a displacement of its piston past the play, zero at zero [m]."""
         displacement = np.asarray(displacement, dtype=float)
         pushed = _soft_positive(displacement - self.dead_band, self.softness)
         rest = _soft_positive(-np.asarray(self.dead_band, dtype=float), self.softness)
-        curve = REFERENCE_STRETCH * (
-            (pushed / REFERENCE_STRETCH) ** self.exponent - (rest / REFERENCE_STRETCH) ** self.exponent
-        )
+        reference = REFERENCE_STRETCH
+        curve = reference * ((pushed / reference) ** self.exponent - (rest / reference) ** self.exponent)
         return self.gain * curve + self.suction * np.minimum(displacement, 0.0)
 
 
@@ -113,15 +103,8 @@ class BackboneParameters:
 
     def __post_init__(self) -> None:
         """Check the values; the error names the field and its bounds."""
-        _check_fields(
-            self,
-            {
-                "taper": (-1.0, 1.0),
-                "threefold": (-0.5, 0.5),
-                "tip_weight": (0.0, 200.0),
-                "segments": (1, 1000),
-            },
-        )
+        _check_fields(self, taper=(-1.0, 1.0), threefold=(-0.5, 0.5))
+        _check_fields(self, tip_weight=(0.0, 200.0), segments=(1, 1000))
 
     def shape(self, bending: ArrayLike, length: ArrayLike, contact: ArrayLike | None = None) -> Array:
         """Arcs of the backbone for a constant-curvature bending angle.

@@ -14,8 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from soro_lib.checks import Vector, not_negative
 from soro_lib.sensing.camera import Camera, Image
 from soro_lib.worlds.rendering import Photometry, TexturedQuad, expose, render
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.float32]
 
 ENDOSCOPE = Camera(640, 480, focal_length=520.0)
 """The camera in the tip: 63 x 50 degrees. The paper prints neither image size nor focal length."""
@@ -36,13 +40,8 @@ PALM = 0.56
 the moving hand hid all features in rare frames, as Wang et al., Sec. IV-C1, describe."""
 
 PALETTE = (
-    (40, 40, 190),
-    (170, 90, 30),
-    (60, 150, 60),
-    (40, 190, 220),
-    (210, 210, 210),
-    (70, 70, 70),
-    (30, 110, 220),
+    *((40, 40, 190), (170, 90, 30), (60, 150, 60), (40, 190, 220)),
+    *((210, 210, 210), (70, 70, 70), (30, 110, 220)),
 )
 """Blue, green, red of the bricks."""
 
@@ -72,14 +71,13 @@ class ViewConditions:
     """
 
     light: float = 1.0
-    hand: tuple[float, float, float] | None = None
+    hand: Vector | None = None
     covered: bool = False
     lamp: tuple[float, float] | None = None
     phase: int = 1
 
     def __post_init__(self) -> None:
-        if not 0 <= self.light < np.inf:
-            raise ValueError(f"ViewConditions.light must be finite and not negative, got {self.light}")
+        not_negative("ViewConditions.light", self.light)
 
 
 @dataclass(frozen=True)
@@ -102,9 +100,9 @@ class BrickScene:
         """Return all printed surfaces, which are made once in a process."""
         return printed_surfaces(self.seed, self.color)
 
-    def image(self, camera_in_world: ArrayLike, camera: Camera = ENDOSCOPE) -> Image:
+    def image(self, camera_in_world: ArrayLike) -> Image:
         """Return the noise-free, undisturbed view (height, width[, 3]) from a (4, 4) camera pose."""
-        return render(camera, camera_in_world, self.quads, background=(0, 0, 0) if self.color else 0)
+        return render(ENDOSCOPE, camera_in_world, self.quads, background=(0, 0, 0) if self.color else 0)
 
 
 @lru_cache(maxsize=4)
@@ -127,7 +125,7 @@ def _in_grey(surface: TexturedQuad) -> TexturedQuad:
     return replace(surface, texture=grey)
 
 
-def _box(rng: np.random.Generator, middle: NDArray[np.float64]) -> list[TexturedQuad]:
+def _box(rng: np.random.Generator, middle: Array) -> list[TexturedQuad]:
     """Return top and sides of a box standing near ``middle`` (2,) [m] on the floor."""
     width, depth = rng.uniform(0.024, 0.046, 2)
     height = rng.uniform(0.018, 0.052)
@@ -138,10 +136,7 @@ def _box(rng: np.random.Generator, middle: NDArray[np.float64]) -> list[Textured
 
 
 def _sides(
-    corner: tuple[float, float, float],
-    size: tuple[float, float, float],
-    rng: np.random.Generator,
-    inward: bool = False,
+    corner: Vector, size: Vector, rng: np.random.Generator, inward: bool = False
 ) -> list[TexturedQuad]:
     """Return the four upright faces of a block, seen from outside or, for the room, from inside."""
     (x, y, z), (width, depth, height) = corner, size
@@ -152,18 +147,13 @@ def _sides(
         if not inward:
             start_x, start_y = start_x + right_x, start_y + right_y
             right_x, right_y = -right_x, -right_y
-        faces.append(
-            _surface(rng, (start_x, start_y, z), (right_x, right_y, 0), (0, 0, height), -1 if inward else 0)
-        )
+        start, right, layer = (start_x, start_y, z), (right_x, right_y, 0), -1 if inward else 0
+        faces.append(_surface(rng, start, right, (0, 0, height), layer))
     return faces
 
 
 def _surface(
-    rng: np.random.Generator,
-    corner: tuple[float, float, float],
-    right: tuple[float, float, float],
-    down: tuple[float, float, float],
-    layer: int = 0,
+    rng: np.random.Generator, corner: Vector, right: Vector, down: Vector, layer: int = 0
 ) -> TexturedQuad:
     """Return a freshly printed surface."""
     corners = np.array(corner) + np.array([(0, 0, 0), right, np.add(right, down), down])
@@ -188,11 +178,7 @@ def brick_texture(rng: np.random.Generator, width: float, height: float) -> Imag
 
 
 def _print_brick(
-    rng: np.random.Generator,
-    texture: Image,
-    corner: tuple[int, int],
-    studs: int,
-    color: NDArray[np.float64],
+    rng: np.random.Generator, texture: Image, corner: tuple[int, int], studs: int, color: Array
 ) -> None:
     """Draw one brick, two studs deep, with light and shade on the studs and three random marks."""
     left, top = corner
@@ -216,7 +202,7 @@ def _print_brick(
             cv2.fillConvexPoly(texture, mark, ink, cv2.LINE_AA)
 
 
-def tip_camera(pose: ArrayLike) -> NDArray[np.float64]:
+def tip_camera(pose: ArrayLike) -> Array:
     """Return ``camera_in_world`` (4, 4) of the camera in the tip for a pose (7,): position [m], quaternion.
 
     Raises
@@ -255,16 +241,14 @@ def disturb(image: Image, conditions: ViewConditions) -> Image:
     return np.asarray(image + opacity * (skin * shade - image), dtype=np.uint8)
 
 
-def _hand(
-    hand: tuple[float, float, float], width: int, height: int
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _hand(hand: Vector, width: int, height: int) -> tuple[Mask, Mask]:
     """Return opacity and shading (height, width) of a defocused hand, drawn small and enlarged."""
     scale = 4
     size = width // scale, height // scale
     palm = np.array([hand[0] * size[0], hand[1] * size[1]])
     forward = np.array([np.cos(hand[2]), np.sin(hand[2])])
     sideways = np.array([-forward[1], forward[0]])
-    mask = np.zeros(size[::-1], dtype=np.float32)
+    mask: Mask = np.zeros(size[::-1], dtype=np.float32)
     degrees = float(np.degrees(hand[2]))
     reach = PALM * size[1]
     _ellipse(mask, palm, (reach, 0.85 * reach), degrees)
@@ -274,16 +258,14 @@ def _hand(
     _ellipse(mask, palm - reach * (1.5 * forward), (1.4 * reach, 0.6 * reach), degrees)
     opacity = cv2.GaussianBlur(mask, (0, 0), 2.0)
     shade = 0.75 + 0.35 * cv2.GaussianBlur(mask, (0, 0), 8.0)
-    target = (width, height)
-    return (
-        np.asarray(cv2.resize(opacity, target, interpolation=cv2.INTER_LINEAR), dtype=np.float32),
-        np.asarray(cv2.resize(shade, target, interpolation=cv2.INTER_LINEAR), dtype=np.float32),
+    opacity, shade = (
+        np.asarray(cv2.resize(part, (width, height), interpolation=cv2.INTER_LINEAR), dtype=np.float32)
+        for part in (opacity, shade)
     )
+    return opacity, shade
 
 
-def _ellipse(
-    mask: NDArray[np.float32], middle: NDArray[np.float64], axes: tuple[float, float], angle: float
-) -> None:
+def _ellipse(mask: Mask, middle: Array, axes: tuple[float, float], angle: float) -> None:
     cv2.ellipse(mask, (tuple(middle.tolist()), (2 * axes[0], 2 * axes[1]), angle), 1.0, -1)
 
 
@@ -301,12 +283,7 @@ def add_lamp(image: Image, lamp: tuple[float, float]) -> Image:
 
 
 def photograph(
-    scene: BrickScene,
-    pose: ArrayLike,
-    conditions: ViewConditions,
-    noise: NDArray[np.float32],
-    camera: Camera = ENDOSCOPE,
-    photometry: Photometry | None = None,
+    scene: BrickScene, pose: ArrayLike, conditions: ViewConditions, noise: NDArray[np.float32]
 ) -> Image:
     """Return the picture that the camera in the tip takes.
 
@@ -320,31 +297,19 @@ def photograph(
         What disturbs the view.
     noise : array of the image's shape, float32
         Standard normal numbers for the sensor noise.
-    camera : Camera, optional
-        Intrinsic parameters.
-    photometry : Photometry, optional
-        Sensor; its gain is multiplied by the ambient light.
 
     Returns
     -------
     array (height, width) or (height, width, 3), uint8
     """
-    sensor = photometry or Photometry()
-    image = disturb(scene.image(tip_camera(pose), camera), conditions)
+    sensor = Photometry()
+    image = disturb(scene.image(tip_camera(pose)), conditions)
     if conditions.lamp is not None:
         image = add_lamp(image, conditions.lamp)
-    gain = sensor.gain * conditions.light
-    lit = Photometry(gain, sensor.read_noise, sensor.shot_noise, sensor.blur, sensor.motion)
-    return expose(image, lit, noise)
+    return expose(image, replace(sensor, gain=sensor.gain * conditions.light), noise)
 
 
-RESTING_HANDS = (
-    (0.15, 0.25, 0.6),
-    (0.8, 0.3, 2.6),
-    (0.25, 0.85, -0.7),
-    (0.85, 0.8, 3.8),
-    (0.5, 0.95, -1.6),
-)
+RESTING_HANDS = ((0.15, 0.25, 0.6), (0.8, 0.3, 2.6), (0.25, 0.85, -0.7), (0.85, 0.8, 3.8), (0.5, 0.95, -1.6))
 """Where the hand rests in the obstacle test, 5 s each; as :attr:`ViewConditions.hand`."""
 
 Timeline = Callable[[float], ViewConditions]

@@ -5,19 +5,6 @@ import pytest
 
 from soro_lib.papers.visual_strain_fusion.experiments import fusion_runs as fusion
 from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import load_flight
-from soro_lib.papers.visual_strain_fusion.world.motion import spiral
-from soro_lib.replication.findings import Finding
-from soro_lib.replication.published import load_published
-
-
-@pytest.fixture(scope="module")
-def motion():
-    return spiral()
-
-
-@pytest.fixture(scope="module")
-def runs():
-    return fusion.fuse_flights(["scene1_obstacles", "scene1_light"], np.random.default_rng(1), seeds=1)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +64,7 @@ def test_ten_seconds_without_the_camera_cost_the_fusion_little(motion):
     assert away["camera_mm"].max() > 15
     assert away["fused_mm"].mean() < 5
     assert run["fused_mm"].iloc[-50:].max() < 2.5
-    assert np.isfinite(run.drop(columns=["fibre_sd_mm", "weighted_error_px"])).all(axis=None)
+    assert np.isfinite(run).all(axis=None)
 
 
 def test_a_flight_without_any_camera_stays_finite(motion):
@@ -99,28 +86,6 @@ def test_drift_is_missing_from_the_filter_s_own_covariance(runs):
     table = fusion.coverage(runs)
     assert (table["own_covariance"] < 0.9).all()
     assert (table["with_drift"] > table["own_covariance"]).all()
-
-
-def test_findings_answer_published_ids_and_nothing_else(runs, motion):
-    light = runs[runs["flight"] == "scene1_light"]
-    obstacles = runs[runs["flight"] == "scene1_obstacles"]
-    findings = fusion.fusion_findings(obstacles, light, fusion.camera_accuracy(), motion)
-    published = load_published("visual_strain_fusion")
-    ids = set(published)
-    assert set(findings) <= ids
-    ours = {row for row in ids if row.startswith(("s4b_", "s4c1_", "s4c2_"))}
-    assert ours == set(findings)
-    assert all(isinstance(finding, Finding) and np.isfinite(finding.value) for finding in findings.values())
-
-
-def test_the_sweep_of_bounds_contains_the_run_itself(runs, obstacles):
-    table = fusion.bounds_sweep(runs, lower=(fusion.SETTINGS.lower,), width=(1.2, 12.0))
-    row = table[
-        (table["flight"] == "scene1_obstacles") & np.isclose(table["upper_px"], fusion.SETTINGS.upper)
-    ]
-    disturbed = obstacles.loc[obstacles["phase"] > 1, "fused_mm"]
-    assert row["mean_mm"].item() == pytest.approx(disturbed.mean(), abs=1e-4)
-    assert row["max_mm"].item() == pytest.approx(disturbed.max(), abs=1e-4)
 
 
 def test_the_inliers_find_the_worst_frames_better_than_their_error_does():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from soro_lib.arcs import chain_transform
 from soro_lib.papers.visual_strain_fusion.world.fibre import FibreGratings, bond_spread
-from soro_lib.papers.visual_strain_fusion.world.motion import glue_fibre, spiral
+from soro_lib.papers.visual_strain_fusion.world.motion import spiral
 
 FIBRE = FibreGratings()
 
@@ -57,12 +57,6 @@ def test_noise_is_that_of_a_resting_fibre():
     """Mean |noise| of a normal variable is 0.798 sigma."""
     noise = FIBRE.shift(np.tile([0.0, 0.0, FIBRE.length], (2000, 1, 1)), rng=np.random.default_rng(1))
     assert np.abs(noise).mean() == pytest.approx(9.07e-13, rel=0.02)
-
-
-def test_glued_fibre_has_the_range_it_was_scaled_to():
-    fibre = glue_fibre(np.random.default_rng(1))
-    motion = spiral(400)
-    assert np.abs(fibre.shift(motion.configuration, motion.elongations)).max() == pytest.approx(1.58e-10)
 
 
 def test_bond_spread_has_mean_one():

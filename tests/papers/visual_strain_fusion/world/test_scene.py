@@ -17,7 +17,6 @@ from soro_lib.papers.visual_strain_fusion.world.scene import (
     undisturbed,
     varying_light,
 )
-from soro_lib.worlds.rendering import Photometry
 
 HOME = np.array([0.0, 0, 0, 0, 0, 0, 1])
 SHAPE = (ENDOSCOPE.height, ENDOSCOPE.width)
@@ -113,7 +112,7 @@ def test_colour_pictures_can_be_disturbed_too():
         ViewConditions(covered=True),
         ViewConditions(lamp=(0.5, 0.5)),
     ):
-        image = photograph(scene, HOME, conditions, sensor, photometry=Photometry(0.8))
+        image = photograph(scene, HOME, conditions, sensor)
         assert image.shape == (*SHAPE, 3)
 
 
