@@ -31,10 +31,9 @@ from soro_lib.papers.shared_control.experiments.recorder import (
 from soro_lib.papers.shared_control.experiments.simulation import METRICS, TIME_LIMIT, trial_metrics
 from soro_lib.papers.shared_control.experiments.trial_format import VIEWS, TrialHeader
 from soro_lib.papers.shared_control.experiments.trials import load_trials
-from soro_lib.papers.shared_control.figures import fig02_task
-from soro_lib.papers.shared_control.world import EXPERT
+from soro_lib.papers.shared_control.figures.trials import fig02_task
 from soro_lib.papers.shared_control.world.hand import felt_force
-from soro_lib.papers.shared_control.world.people import DEVICE_SCALE
+from soro_lib.papers.shared_control.world.people import DEVICE_SCALE, EXPERT
 from soro_lib.papers.shared_control.world.plant import NOTHING, SAMPLE_TIME, nearest_item
 from soro_lib.project import data_directory, trials_directory
 from soro_lib.replication import as_image

@@ -42,23 +42,24 @@ from soro_lib.controllers.shared_control.goal_selection import (
 from soro_lib.controllers.shared_control.guidance import distance_to_goal, guidance_force, hooke_magnitude
 from soro_lib.controllers.shared_control.paradigms import ASSISTANCES, PARADIGMS, Paradigm, desired_position
 from soro_lib.jit import inlined
+from soro_lib.papers.shared_control.world.loop import View
+from soro_lib.papers.shared_control.world.people import SAMPLE_TIME
 from soro_lib.papers.shared_control.world.plant import (
     NOTHING,
     REAL_GRIPPER,
-    SAMPLE_TIME,
     SIMULATED_GRIPPER,
     GripperRule,
     GripperState,
     PlantParameters,
-    PlantRule,
     PlantState,
-    command_buffer,
     gripper_step,
     plant_start,
     plant_step,
     real_arm,
+    simulated_tip,
     tracked_tip,
 )
+from soro_lib.papers.shared_control.world.vectors import ZERO, delay_line, difference, row, size
 
 UNASSISTED, AS_NEEDED, FIXED = range(len(ASSISTANCES))
 
@@ -99,15 +100,13 @@ class TaskSettings:
     force_law : {"printed", "program"}
         Unit direction and th_D = 30 mm as printed; or the authors' program: direction not normalised, th_D =
         50 mm, its own counter tau, fixed assistance without damper and silent below 30 mm.
-    assist_as_needed, fixed_assistance : mapping
-        Parameters that differ from the defaults of `AssistAsNeeded` and `FixedAssistance`.
+    assist_as_needed : mapping
+        Parameters that differ from the defaults of `AssistAsNeeded`.
     scene : Scene
     detection_error : tuple of float
         Error of the goals that the machine is told, added to items and targets alike [m].
     lift : bool or None
         Whether the machine lifts between goals; None: as the paradigm does.
-    printed_goal_machine : bool
-        Without the mends of `GoalSelection`.
     tracking_noise : float or None
         Of the real arm's tracked tip [m]; None: as in `real_arm`.
     """
@@ -116,11 +115,9 @@ class TaskSettings:
     environment: Literal["simulated", "real"] = "simulated"
     force_law: Literal["printed", "program"] = "printed"
     assist_as_needed: dict[str, object] = field(default_factory=dict)
-    fixed_assistance: dict[str, object] = field(default_factory=dict)
     scene: Scene = Scene()
     detection_error: Vector = (0.0, 0.0, 0.0)
     lift: bool | None = None
-    printed_goal_machine: bool = False
     tracking_noise: float | None = None
 
     def __post_init__(self) -> None:
@@ -141,7 +138,7 @@ class TaskSettings:
         as_needed = {"near_distance": 0.05, "counter": "program"} if program else {}
         fixed = {"near_distance": 0.03, "damping": 0.0} if program else {}
         assist = AssistAsNeeded(**{**as_needed, **self.assist_as_needed})  # type: ignore[arg-type]
-        spring = FixedAssistance(**{**fixed, **self.fixed_assistance})  # type: ignore[arg-type]
+        spring = FixedAssistance(**fixed)
         real = self.environment == "real"
         plant = real_arm(self.tracking_noise) if real else PlantParameters()
         error = np.array(vector("detection_error", self.detection_error))
@@ -150,7 +147,6 @@ class TaskSettings:
             np.array(self.scene.targets) + error,
             lift=self.paradigm.lifts if self.lift is None else self.lift,
             reach=plant.maximum_length,
-            printed=self.printed_goal_machine,
         )
         return TaskRule(
             goals=goals.rule,
@@ -179,7 +175,7 @@ class TaskRule(NamedTuple):
     assist_maximum: float
     fixed: FixedRule
     window: int
-    plant: PlantRule
+    plant: PlantParameters
     gripper: GripperRule
     assistance: int
     automation: Vector
@@ -233,7 +229,7 @@ def task_memory(rule: TaskRule, scene: Scene) -> TaskMemory:
     """Fresh arrays for one trial."""
     return TaskMemory(
         window=np.zeros(rule.window),
-        delayed=command_buffer(rule.plant, scene.start),
+        delayed=delay_line(scene.start, rule.plant.command_delay),
         items=np.array(scene.items, dtype=float),
         releases=np.full((len(scene.items), 4), np.nan),
     )
@@ -241,7 +237,6 @@ def task_memory(rule: TaskRule, scene: Scene) -> TaskMemory:
 
 def task_start(rule: TaskRule, start: Vector) -> TaskState:
     """A trial before its first sample: tip at rest, gripper open, no force."""
-    zero = (0.0, 0.0, 0.0)
     first = rule.goals.items[0]
     return TaskState(
         sample=0,
@@ -252,7 +247,7 @@ def task_start(rule: TaskRule, start: Vector) -> TaskState:
         gripper=GripperState(NOTHING, -1.0),
         automatic=start,
         desired=start,
-        force=zero,
+        force=ZERO,
         magnitude=0.0,
         closed=False,
         tally=Tally(0.0, 0.0, 0.0, math.nan),
@@ -298,17 +293,6 @@ def assist(
 
 
 @inlined
-def approach_goal(automatic: Vector, goal: Vector) -> Vector:
-    """Let the automatic command close in on the goal, as the authors' program does."""
-    share = SAMPLE_TIME / (AUTOMATIC_LAG + SAMPLE_TIME)
-    return (
-        automatic[0] + share * (goal[0] - automatic[0]),
-        automatic[1] + share * (goal[1] - automatic[1]),
-        automatic[2] + share * (goal[2] - automatic[2]),
-    )
-
-
-@inlined
 def task_step(
     rule: TaskRule,
     state: TaskState,
@@ -323,7 +307,7 @@ def task_step(
     ``closed``: the gripper's button is held. ``confirmed``: the operator reports an item in the gripper (the
     second button); heeded by the real variant, which cannot sense it.
     """
-    automatic = approach_goal(state.automatic, state.goal.goal)
+    automatic = simulated_tip(state.automatic, state.goal.goal, AUTOMATIC_LAG)
     desired = desired_position(command, automatic, rule.automation)
     plant = plant_step(rule.plant, state.plant, memory.delayed, desired)
     tip = plant.tip
@@ -347,15 +331,15 @@ def task_step(
     tracked = tracked_tip(tip, rule.plant.tracking_noise, rng)
     held = confirmed if rule.confirmed_by_hand else gripper.item != NOTHING
     goal = goal_step(rule.goals, state.goal, tracked, held)
-    assisted, fixed, magnitude, force = state.assist, state.fixed, 0.0, (0.0, 0.0, 0.0)
+    assisted, fixed, magnitude, force = state.assist, state.fixed, 0.0, ZERO
     if rule.assistance != UNASSISTED:
         assisted, fixed, magnitude, force = assist(rule, assisted, fixed, memory.window, tracked, goal.goal)
 
-    size = distance_to_goal((0.0, 0.0, 0.0), force)
+    newton = size(force)
     tally = Tally(
-        path=state.tally.path + distance_to_goal(tip, state.plant.tip),
-        impulse=state.tally.impulse + SAMPLE_TIME * size,
-        peak_force=max(state.tally.peak_force, size),
+        path=state.tally.path + size(difference(state.plant.tip, tip)),
+        impulse=state.tally.impulse + SAMPLE_TIME * newton,
+        peak_force=max(state.tally.peak_force, newton),
         opening_error=opening_error,
     )
     return TaskState(
@@ -379,6 +363,18 @@ def delivered(rule: TaskRule, state: TaskState) -> bool:
     """Whether the last item has been released on its target."""
     last = state.goal.item >= len(rule.goals.items) - 1
     return state.goal.phase == END or (last and state.goal.phase == LIFTING_EMPTY)
+
+
+@inlined
+def operator_view(rule: TaskRule, state: TaskState, items: NDArray[np.float64]) -> View:
+    """What an operator sees and feels. Wanted: the target of the item in the gripper, else the next item."""
+    held = state.gripper.item != NOTHING
+    if held:
+        wanted = rule.targets[state.gripper.item]
+    else:
+        following = state.goal.item + 1 if state.goal.phase == LIFTING_EMPTY else state.goal.item
+        wanted = row(items, min(following, len(items) - 1))
+    return View(state.plant.tip, state.desired, wanted, state.force, held, rule.automation)
 
 
 # --- The task for a hand from outside ------------------------------------------------------------------
@@ -496,15 +492,14 @@ class Trial:
 
     def _sample(self, held_command: bool) -> Sample:
         state = self.state
+        stiffness = {AS_NEEDED: state.assist.stiffness, FIXED: self.rule.fixed.stiffness}
         return Sample(
             time=SAMPLE_TIME * state.sample,
             tip=np.array(state.plant.tip),
             desired=np.array(state.desired),
             goal=np.array(state.goal.goal),
             force=np.array(state.force),
-            stiffness=state.assist.stiffness
-            if self.rule.assistance == AS_NEEDED
-            else self._fixed_stiffness(),
+            stiffness=stiffness.get(self.rule.assistance, 0.0),
             magnitude=state.magnitude,
             motion=MOTIONS[state.assist.motion],
             phase=PHASES[state.goal.phase],
@@ -513,6 +508,3 @@ class Trial:
             done=self.done,
             held_command=held_command,
         )
-
-    def _fixed_stiffness(self) -> float:
-        return self.rule.fixed.stiffness if self.rule.assistance == FIXED else 0.0

@@ -15,6 +15,7 @@ import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.controllers.shared_control.assist_as_needed import MOTIONS
 from soro_lib.controllers.shared_control.goal_selection import PHASES
 from soro_lib.papers.shared_control.experiments.task import Scene, TaskSettings, Trial
-from soro_lib.papers.shared_control.world import EXPERT
+from soro_lib.papers.shared_control.world.people import EXPERT
 
 MAGIC = "# soro_lib trial 1"
 """First line of every trial file; the number is that of the format."""
@@ -51,8 +52,7 @@ HEADER = {
     "items_m": "[m] centres of the items, in the order of the task",
     "targets_m": "[m] centres of their targets",
 }
-"""Entries of the header and their units; force_law, kind, view, seed and hand_stiffness_n_per_m may be left
-out."""
+"""Entries of the header and their units; those not `NEEDED` may be left out."""
 
 AXES = ("x", "y", "z")
 
@@ -62,6 +62,16 @@ VIEWS = ("above and front", "camera")
 
 def _axes(name: str, unit: str, meaning: str) -> dict[str, str]:
     return {f"{name}_{axis}_{unit.lower()}": f"[{unit}] {meaning}, {axis}" for axis in AXES}
+
+
+def unit_of(meaning: str) -> str:
+    """The unit with which the meaning of a column begins, "N/m" of "[N/m] stiffness"."""
+    return meaning[1:].partition("]")[0]
+
+
+def suffix_of(unit: str) -> str:
+    """How the names of columns in a unit end: "n_per_m" for "N/m"."""
+    return unit.lower().replace("/", "_per_")
 
 
 COLUMNS = {
@@ -146,19 +156,7 @@ class TrialHeader:
 
     def text(self) -> str:
         """The comment lines at the top of a trial file."""
-        values = {
-            "paradigm": self.paradigm,
-            "environment": self.environment,
-            "force_law": self.force_law,
-            "operator": self.operator,
-            "kind": self.kind,
-            "view": self.view,
-            "seed": self.seed,
-            "hand_stiffness_n_per_m": self.hand_stiffness,
-            "start_m": self.scene.start,
-            "items_m": self.scene.items,
-            "targets_m": self.scene.targets,
-        }
+        values = {name: attrgetter(ATTRIBUTES.get(name, name))(self) for name in HEADER}
         entries = [f"# {name} = {json.dumps(value, ensure_ascii=False)}" for name, value in values.items()]
         return "\n".join([MAGIC, *entries]) + "\n"
 
@@ -171,42 +169,36 @@ class TrialHeader:
         ValueError
             If a line is no TOML, an entry is missing, unknown or out of bounds.
         """
-        if not lines or lines[0].strip() != MAGIC:
-            raise ValueError(
-                f'the first line must be "{MAGIC}", got {lines[0].strip()[:60] if lines else ""!r}'
-            )
+        first = lines[0].strip() if lines else ""
+        if first != MAGIC:
+            raise ValueError(f'the first line must be "{MAGIC}", got {first[:60]!r}')
         try:
             values = tomllib.loads("\n".join(line.lstrip("#").strip() for line in lines[1:]))
         except tomllib.TOMLDecodeError as error:
             raise ValueError(f"the header is not TOML: {error}") from None
-        for name in values:
-            if name not in HEADER:
-                raise ValueError(f"unknown entry {name!r} in the header; known are {', '.join(HEADER)}")
+        unknown = [name for name in values if name not in HEADER]
+        if unknown:
+            raise ValueError(f"unknown entry {unknown[0]!r} in the header; known are {', '.join(HEADER)}")
         for name, kind in ENTRY_TYPES.items():
             if name in values and not isinstance(values[name], kind):
                 raise ValueError(f"{name} must be {HEADER[name]}, got {values[name]!r}")
-        missing = [name for name in HEADER if name not in values and name not in OPTIONAL_ENTRIES]
+        missing = [name for name in NEEDED if name not in values]
         if missing:
             raise ValueError(f"the header lacks {', '.join(missing)}")
-        scene = Scene(
-            start=vector("start_m", values["start_m"]),
-            items=goal_points("items_m", values["items_m"], LARGEST["m"]),
-            targets=goal_points("targets_m", values["targets_m"], LARGEST["m"]),
-        )
-        return cls(
-            paradigm=values["paradigm"],
-            environment=values["environment"],
-            operator=values["operator"],
-            force_law=values.get("force_law", "printed"),
-            kind=values.get("kind", "own"),
-            view=values.get("view", "camera"),
-            seed=tuple(values.get("seed", ())),
-            hand_stiffness=float(values.get("hand_stiffness_n_per_m", EXPERT.hand_stiffness)),
-            scene=scene,
-        )
+        start = vector("start_m", values.pop("start_m"))
+        goals = [goal_points(name, values.pop(name), LARGEST["m"]) for name in ("items_m", "targets_m")]
+        stiffness = values.pop("hand_stiffness_n_per_m", EXPERT.hand_stiffness)
+        values |= {"seed": tuple(values.get("seed", ())), "hand_stiffness": float(stiffness)}
+        return cls(**values, scene=Scene(start, *goals))
 
 
-OPTIONAL_ENTRIES = ("force_law", "kind", "view", "seed", "hand_stiffness_n_per_m")
+ATTRIBUTES = {
+    "hand_stiffness_n_per_m": "hand_stiffness",
+    **{f"{name}_m": f"scene.{name}" for name in ("start", "items", "targets")},
+}
+"""Where a header's entry stands in `TrialHeader`, if not under its own name."""
+
+NEEDED = ("paradigm", "environment", "operator", "start_m", "items_m", "targets_m")
 ENTRY_TYPES: Mapping[str, Any] = {
     **dict.fromkeys(("paradigm", "environment", "force_law", "operator", "kind", "view"), str),
     **dict.fromkeys(("seed", "start_m", "items_m", "targets_m"), list),

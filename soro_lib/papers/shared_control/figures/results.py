@@ -1,6 +1,6 @@
-"""The demonstrations: Figs. 7, 8 and 9, and the claims over all conditions."""
+"""The demonstrations: Figs. 7, 8 and 9, and the claims over all conditions; the tuning study."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from string import ascii_lowercase
 from typing import Any
 
@@ -8,24 +8,26 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from numpy.typing import ArrayLike
 
 from soro_lib.controllers.shared_control import PARADIGMS
-from soro_lib.papers.shared_control.experiments.simulation import METRICS
-from soro_lib.replication.plotting import COLORS, SERIES, box_groups, label_axes, legend, new_figure
+from soro_lib.replication.plotting import (
+    COLORS,
+    REFERENCE,
+    SERIES,
+    box_groups,
+    label_axes,
+    legend,
+    new_figure,
+)
 
 SHORT = dict(zip(PARADIGMS, ("Full", "AAN", "Fixed", "MSAE", "ASME", "Auto"), strict=True))
 PARADIGM_COLORS = dict(zip(PARADIGMS, (COLORS["black"], *SERIES[:5]), strict=True))
 
-
-OWN = {
-    "linestyle": "none",
-    "marker": "*",
-    "markersize": 10,
-    "color": COLORS["vermillion"],
-    "markeredgecolor": "white",
-    "markeredgewidth": 0.6,
-    "zorder": 6,
+OWN: dict[str, Any] = {
+    **{"linestyle": "none", "marker": "*", "markersize": 10, "color": COLORS["vermillion"]},
+    **{"markeredgecolor": "white", "markeredgewidth": 0.6, "zorder": 6},
 }
 """A trial that somebody drove, over simulated ones."""
 
@@ -58,14 +60,8 @@ def _boxes(trials: pd.DataFrame, metric: str, label: str, own: pd.DataFrame | No
             for name, group in cell.groupby("paradigm", sort=False)
         }
         box_groups(axes, samples, tuple(PARADIGM_COLORS[name] for name in samples))
-        axes.plot(
-            range(1, len(samples) + 1),
-            [values.mean() if len(values) else np.nan for values in samples.values()],
-            "D",
-            markersize=3.5,
-            color=COLORS["black"],
-            zorder=5,
-        )
+        means = [values.mean() if len(values) else np.nan for values in samples.values()]
+        axes.plot(range(1, len(samples) + 1), means, "D", markersize=3.5, color=COLORS["black"], zorder=5)
         mine = _finished(own, trials, (environment, kind), samples)
         axes.plot([list(samples).index(name) + 1 for name in mine["paradigm"]], mine[metric], **OWN)
         axes.set_xticklabels([SHORT[name] for name in samples])
@@ -84,8 +80,7 @@ def _finished(
     own: pd.DataFrame | None, trials: pd.DataFrame, cell: tuple[Any, Any], paradigms: Iterable[str]
 ) -> pd.DataFrame:
     """The driven trials that belong into a panel: of its environment and kind, or of no kind shown."""
-    if own is None:
-        return pd.DataFrame(columns=["paradigm", *METRICS])
+    own = trials.iloc[:0] if own is None else own
     environment, kind = cell
     fits = (own["environment"] == environment) & own["paradigm"].isin(list(paradigms))
     fits &= (own["kind"] == kind) | ~own["kind"].isin(trials["kind"])
@@ -99,9 +94,8 @@ def fig08_error_against_time(trials: pd.DataFrame, own: pd.DataFrame | None = No
     """
     panels = list(trials.groupby(["environment", "kind"], sort=False))
     rows, columns = -(-len(panels) // 2), min(len(panels), 2)
-    figure, grid = new_figure(
-        height=0.4 + 2.4 * rows, rows=rows, columns=columns, sharex=True, sharey=True, squeeze=False
-    )
+    shared = {"sharex": True, "sharey": True, "squeeze": False}
+    figure, grid = new_figure(height=0.4 + 2.4 * rows, rows=rows, columns=columns, **shared)
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
     for axes, letter, ((environment, kind), cell) in zip(grid.flat, ascii_lowercase, panels):
@@ -154,13 +148,11 @@ def fig09_assistance(trials: pd.DataFrame, own: pd.DataFrame | None = None) -> F
     colors = []
     for (environment, kind), cell in trials.groupby(["environment", "kind"], sort=False):
         for name in ("assist_as_needed", "fixed_assistance"):
-            forces = cell.loc[cell["paradigm"] == name, "assistance_n"].to_numpy()
-            if len(forces) == 0:
-                continue
-            samples[f"{SHORT[name]}\n{kind}\n{environment}"] = forces
-            colors.append(PARADIGM_COLORS[name])
-            mine = _finished(own, trials, (environment, kind), [name])["assistance_n"]
-            axes.plot([len(samples)] * len(mine), mine, **OWN)
+            if len(forces := cell.loc[cell["paradigm"] == name, "assistance_n"].to_numpy()):
+                samples[f"{SHORT[name]}\n{kind}\n{environment}"] = forces
+                colors.append(PARADIGM_COLORS[name])
+                mine = _finished(own, trials, (environment, kind), [name])["assistance_n"]
+                axes.plot([len(samples)] * len(mine), mine, **OWN)
     if samples:
         box_groups(axes, samples, tuple(colors))
     label_axes(axes, y="mean force H [N]")
@@ -169,32 +161,88 @@ def fig09_assistance(trials: pd.DataFrame, own: pd.DataFrame | None = None) -> F
 
 def claim_matrix(probabilities: pd.DataFrame) -> Figure:
     """Probability of every claim (rows) under every attitude, law and approach (columns)."""
+    place = probabilities["environment"].str.replace("simulated", "sim")
     table = probabilities.assign(
         condition=probabilities["attitude"] + ", " + probabilities["law"] + ", " + probabilities["approach"],
-        row=probabilities["claim"].str.replace("_", " ")
-        + " ("
-        + probabilities["kind"]
-        + ", "
-        + probabilities["environment"].str.replace("simulated", "sim")
-        + ")",
+        row=probabilities["claim"].str.replace("_", " ") + " (" + probabilities["kind"] + ", " + place + ")",
     )
     matrix = table.pivot_table(index="row", columns="condition", values="probability", sort=False)
+    words = matrix.map(lambda value: f"{value:.2f}".lstrip("0") or "0" if np.isfinite(value) else "")
     figure, axes = new_figure(height=0.155 * len(matrix) + 1.6)
-    image = axes.imshow(matrix, cmap="RdYlBu", vmin=0, vmax=1, aspect="auto")
-    for (row, column), value in np.ndenumerate(matrix.to_numpy()):
-        if np.isfinite(value):
-            color = "white" if value < 0.12 or value > 0.88 else COLORS["black"]
-            axes.text(
-                column,
-                row,
-                f"{value:.2f}".lstrip("0") or "0",
-                ha="center",
-                va="center",
-                fontsize=5.5,
-                color=color,
-            )
-    axes.set_yticks(range(len(matrix)), list(matrix.index), fontsize=6)
-    axes.set_xticks(range(len(matrix.columns)), list(matrix.columns), rotation=40, ha="right", fontsize=6.5)
-    axes.grid(visible=False)
+    white = (matrix < 0.12) | (matrix > 0.88)
+    image = number_map(axes, matrix, words, white, 5.5, cmap="RdYlBu", vmin=0, vmax=1)
+    axes.set_yticks(axes.get_yticks(), matrix.index, fontsize=6)
+    axes.set_xticks(axes.get_xticks(), matrix.columns, rotation=40, ha="right", fontsize=6.5)
     figure.colorbar(image, ax=axes, shrink=0.3, label="probability over operators")
+    return figure
+
+
+def number_map(
+    axes: Axes,
+    table: pd.DataFrame,
+    words: pd.DataFrame,
+    white: pd.DataFrame,
+    fontsize: float,
+    dark: str = COLORS["black"],
+    **options: Any,
+) -> AxesImage:
+    """Draw a table as colours, named along both sides, with words in each cell, white where so marked."""
+    image = axes.imshow(table, aspect="auto", **options)
+    for (row, column), text in np.ndenumerate(words.to_numpy()):
+        color = "white" if white.iat[row, column] else dark
+        axes.text(column, row, text, ha="center", va="center", fontsize=fontsize, color=color)
+    axes.set_yticks(range(len(table)), list(table.index))
+    axes.set_xticks(range(table.shape[1]), list(table.columns))
+    axes.grid(visible=False)
+    return image
+
+
+# --- The tuning study ---------------------------------------------------------------------------------------
+
+THIN = {**REFERENCE, "linewidth": 0.9}
+METRIC_NAMES = {"time_s": "T", "path_m": "L", "assistance_n": "H", "placement_error_mm": "P"}
+
+
+def anova_comparison(tables: Mapping[str, pd.DataFrame]) -> Figure:
+    """p of every main and two-way effect: repetitions as blocks F(1, 2) against the plain analysis.
+
+    Parameters
+    ----------
+    tables : mapping of str to pandas.DataFrame
+        By response: columns effect, p_blocked, p_plain.
+    """
+    figure, axes = new_figure(height=3.4)
+    for color, (response, table) in zip(SERIES, tables.items()):
+        style = {"markersize": 4, "alpha": 0.8, "color": color, "label": METRIC_NAMES[response]}
+        axes.loglog(table["p_plain"].clip(lower=1e-4), table["p_blocked"], "o", **style)
+    axes.axhline(0.05, **THIN)
+    axes.axvline(0.05, **THIN)
+    label_axes(axes, "p, plain n-way analysis (least drawn: 0.0001)", "p, repetitions as blocks F(1, 2)")
+    legend(axes, title="response")
+    return figure
+
+
+def implied_scatter(table: pd.DataFrame) -> Figure:
+    """Scatter of single trials that the printed F imply, beside that of the simulated operators.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Columns response, printed (implied by an effect and its F) and one column per simulated operator.
+    """
+    figure, grid = new_figure(height=2.6, columns=3)
+    operators = [name for name in table.columns if name not in ("response", "printed")]
+    units = {"time_s": "s", "path_m": "m", "assistance_n": "N"}
+    for axes, (response, group) in zip(grid, table.groupby("response", sort=False), strict=True):
+        axes.bar(operators, group[operators].iloc[0], color=SERIES[0], alpha=0.6)
+        for value in group["printed"]:
+            axes.axhline(value, **REFERENCE)
+        if response == "assistance_n":
+            axes.axhline(3.5, color=COLORS["black"], linewidth=1, linestyle=":")
+            words = "no quantity in 0 to 7 N\nscatters more"
+            axes.annotate(words, (0.02, 4.2), xycoords=("axes fraction", "data"), fontsize=6.5)
+        axes.tick_params(axis="x", rotation=30)
+        label_axes(axes, y=f"sd of {METRIC_NAMES[str(response)]} [{units[str(response)]}]")
+    grid[0].plot([], [], **REFERENCE, label="implied by the printed F")
+    legend(figure)
     return figure

@@ -49,14 +49,8 @@ def _shade(
         name = names[codes[start]]
         label = None if name in named or name == "start" else name
         named.add(name)
-        axes.axvspan(
-            time.iloc[start],
-            time.iloc[end - 1] + 0.01,
-            color=colors[name],
-            alpha=0.25,
-            linewidth=0,
-            label=label,
-        )
+        style = {"color": colors[name], "alpha": 0.25, "linewidth": 0}
+        axes.axvspan(time.iloc[start], time.iloc[end - 1] + 0.01, **style, label=label)
 
 
 def fig02_task(traces: Mapping[str, pd.DataFrame], scene: Scene) -> Figure:
@@ -79,14 +73,8 @@ def fig02_task(traces: Mapping[str, pd.DataFrame], scene: Scene) -> Figure:
         for number, (item, target) in enumerate(zip(scene.items, scene.targets, strict=True)):
             style = {"color": SERIES[number], "linestyle": "none"}
             axes.plot(*np.array([item]).T, "s", markersize=8, **style, label=f"item {number + 1}")
-            axes.plot(
-                *np.array([target]).T,
-                "o",
-                markersize=11,
-                fillstyle="none",
-                **style,
-                label=f"target {number + 1}",
-            )
+            ring = {"markersize": 11, "fillstyle": "none", **style}
+            axes.plot(*np.array([target]).T, "o", **ring, label=f"target {number + 1}")
         equal_aspect(axes, np.vstack([places, path]))
         axes.invert_zaxis()
         axes.view_init(elev=22, azim=-65)

@@ -9,8 +9,9 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
-Vector = tuple[float, float, float]
+from soro_lib.checks import Vector
 
 SAMPLE_TIME = 0.01
 """Period of the control loop [s]."""
@@ -18,6 +19,16 @@ SAMPLE_TIME = 0.01
 
 DEVICE_SCALE: Vector = (10.0, 10.0, 15.0)
 """Tip displacement per hand displacement along x, y, z [-], as in the authors' program."""
+
+POSITIVE = pd.Interval(0.0, math.inf, closed="right")
+NOT_NEGATIVE = pd.Interval(0.0, math.inf, closed="both")
+
+
+def check_fields(parameters: Any, bounds: Mapping[str, pd.Interval]) -> None:
+    """Raise a ValueError that names the first field out of its bounds; without an entry, below zero."""
+    for name, value in vars(parameters).items():
+        if value not in bounds.get(name, NOT_NEGATIVE):
+            raise ValueError(f"{name} must lie in {bounds.get(name, NOT_NEGATIVE)}, got {value!r}")
 
 
 @dataclass(frozen=True)
@@ -118,31 +129,25 @@ class Operator:
     approach_height: float = 0.1
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if math.isnan(value):
-                raise ValueError(f"{field.name} must be a number, got nan")
-            if field.name != "mapping_angle" and value < 0:
-                raise ValueError(f"{field.name} must not be below 0, got {value!r}")
-            if field.name in POSITIVE and value == 0:
-                raise ValueError(f"{field.name} must be above 0")
-        for name in ("lag_model", "learn"):
-            if getattr(self, name) > 1:
-                raise ValueError(f"{name} must lie in [0, 1], got {getattr(self, name)!r}")
-        if self.passivity >= 1:
-            raise ValueError(f"passivity must lie in [0, 1), got {self.passivity!r}")
-        if not 0 < self.view_elevation < math.pi / 2:
-            raise ValueError(f"view_elevation must lie in (0, pi/2) rad, got {self.view_elevation!r}")
+        check_fields(self, BOUNDS)
 
     def rule(self) -> Any:
         """The same fields as a named tuple of floats, which the compiled rules can take."""
         return OperatorRule(*(float(getattr(self, field.name)) for field in fields(self)))
 
 
-POSITIVE = (
+ABOVE_ZERO = (
     *("submovement_time", "primary_gain", "gain_factor", "tolerance", "wait_speed", "yield_time"),
     *("hand_mass", "hand_damping", "hand_stiffness"),
 )
+BOUNDS: Mapping[str, pd.Interval] = {
+    **dict.fromkeys(ABOVE_ZERO, POSITIVE),
+    **dict.fromkeys(("lag_model", "learn"), pd.Interval(0.0, 1.0, closed="both")),
+    "mapping_angle": pd.Interval(-math.inf, math.inf, closed="neither"),
+    "passivity": pd.Interval(0.0, 1.0, closed="left"),
+    "view_elevation": pd.Interval(0.0, math.pi / 2, closed="neither"),
+}
+"""Where the fields of `Operator` must lie; the others, which have no entry, not below zero."""
 
 OperatorRule: Any = NamedTuple("OperatorRule", [(field.name, float) for field in fields(Operator)])  # type: ignore[misc]
 
@@ -194,11 +199,10 @@ class Population:
 
     def draw(self, rng: np.random.Generator) -> Operator:
         """One person: log-normal about the medians, normal for lag model and learning (clipped to [0, 1])."""
-        changes = {}
-        for name, spread in SPREADS.items():
-            median = getattr(self.typical, name)
-            factor = math.exp(spread * rng.standard_normal())
-            changes[name] = median * factor
+        changes = {
+            name: getattr(self.typical, name) * math.exp(spread * rng.standard_normal())
+            for name, spread in SPREADS.items()
+        }
         for name in ("lag_model", "learn"):
             value = getattr(self.typical, name) + 0.1 * rng.standard_normal()
             changes[name] = min(max(value, 0.0), 1.0)

@@ -8,13 +8,26 @@ Source: Stroppa et al., Sections 3.1, 3.2 and supplement, Sections 4 and 5.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import Vector, vector
 from soro_lib.jit import inlined
+from soro_lib.papers.shared_control.world.people import POSITIVE, SAMPLE_TIME, check_fields
+from soro_lib.papers.shared_control.world.vectors import (
+    delay_line,
+    difference,
+    row,
+    scattered,
+    set_row,
+    size,
+    towards,
+)
 from soro_lib.robots.soft_growing import (
     eversion_length,
     eversion_proxy,
@@ -23,38 +36,11 @@ from soro_lib.robots.soft_growing import (
     steering_coordinates,
 )
 
-Vector = tuple[float, float, float]
-
-SAMPLE_TIME = 0.01
-"""Period of the control loop [s] (Stroppa et al., Table 3: 100 Hz)."""
-
 TRACKING_RATE = 270.0
 """Rate of the motion capture [Hz] (Stroppa et al., Section 3.3.1)."""
 
 REFERENCE_LENGTH = 0.65
 """Length at which the gains and lags of the real arm are stated [m]: tip at the items."""
-
-
-class PlantRule(NamedTuple):
-    """`PlantParameters` as plain numbers, with the command delay in samples."""
-
-    real: bool
-    tip_lag: float
-    command_delay: int
-    steering_gain: float
-    steering_damping: float
-    steering_lag: float
-    cable_friction: float
-    eversion_gain: float
-    feed_forward: float
-    passive_growth: float
-    eversion_lag: float
-    maximum_speed: float
-    maximum_tilt: float
-    minimum_length: float
-    maximum_length: float
-    floor: float
-    tracking_noise: float
 
 
 @dataclass(frozen=True)
@@ -117,33 +103,28 @@ class PlantParameters:
     tracking_noise: float = 0.0
 
     def __post_init__(self) -> None:
-        may_be_zero = {
-            "command_delay",
-            "steering_damping",
-            "cable_friction",
-            "feed_forward",
-            "passive_growth",
-        }
-        may_be_zero |= {"tracking_noise"}
-        for name in (field.name for field in fields(self) if field.name != "real"):
-            value = getattr(self, name)
-            if math.isnan(value) or value < 0 or (value == 0 and name not in may_be_zero):
-                bound = "not below 0" if name in may_be_zero else "above 0"
-                raise ValueError(f"{name} must be {bound}, got {value!r}")
-        if self.maximum_tilt >= math.pi / 2:
-            raise ValueError(f"maximum_tilt must be below pi/2, got {self.maximum_tilt!r}")
+        check_fields(self, BOUNDS)
         if self.minimum_length >= self.maximum_length:
-            raise ValueError(
-                f"minimum_length must be below maximum_length = {self.maximum_length} m, "
-                f"got {self.minimum_length}"
-            )
+            bound = f"maximum_length = {self.maximum_length} m"
+            raise ValueError(f"minimum_length must be below {bound}, got {self.minimum_length}")
 
-    def rule(self) -> PlantRule:
-        """Plain numbers for the compiled rules."""
-        values: dict[str, Any] = {field.name: float(getattr(self, field.name)) for field in fields(self)}
-        values["real"] = bool(self.real)
-        values["command_delay"] = round(self.command_delay / SAMPLE_TIME)
-        return PlantRule(**values)
+    def rule(self) -> Any:
+        """The same fields as a named tuple, which the compiled rules can take; command delay in samples."""
+        values = {name: float(value) for name, value in vars(self).items()}
+        delay = round(self.command_delay / SAMPLE_TIME)
+        return PlantRule(**values | {"real": bool(self.real), "command_delay": delay})
+
+
+ABOVE_ZERO = (
+    *("tip_lag", "steering_gain", "steering_lag", "eversion_gain", "eversion_lag"),
+    *("maximum_speed", "minimum_length", "maximum_length", "floor"),
+)
+BOUNDS: Mapping[str, pd.Interval] = {
+    **dict.fromkeys(ABOVE_ZERO, POSITIVE),
+    "maximum_tilt": pd.Interval(0.0, math.pi / 2, closed="neither"),
+}
+
+PlantRule: Any = NamedTuple("PlantRule", [(field.name, float) for field in fields(PlantParameters)])  # type: ignore[misc]
 
 
 def real_arm(tracking_noise: float | None = None) -> PlantParameters:
@@ -207,8 +188,7 @@ def control_error(
     ValueError
         If a position is malformed, or at the base, where no direction exists.
     """
-    tip = np.array(finite_point("actual", actual))
-    aim = np.array(finite_point("desired", desired))
+    tip, aim = np.array(vector("actual", actual)), np.array(vector("desired", desired))
     length = float(eversion_length(tip))
     if length == 0:
         raise ValueError("actual must not be the base: the body has no direction there")
@@ -221,12 +201,7 @@ def control_error(
 @inlined
 def simulated_tip(tip: Vector, desired: Vector, lag: float) -> Vector:
     """One period of the simulator's first-order tip, exact for the authors' step of 1 % per 10 ms."""
-    share = SAMPLE_TIME / (lag + SAMPLE_TIME)
-    return (
-        tip[0] + share * (desired[0] - tip[0]),
-        tip[1] + share * (desired[1] - tip[1]),
-        tip[2] + share * (desired[2] - tip[2]),
-    )
+    return towards(tip, SAMPLE_TIME / (lag + SAMPLE_TIME), desired)
 
 
 @inlined
@@ -244,28 +219,28 @@ def steering_command(gain: float, damping: float, length: float, error: float, e
 @inlined
 def limited(x: float, y: float, bound: float) -> tuple[float, float]:
     """The vector (x, y), shortened to the bound where it is longer."""
-    size = math.sqrt(x * x + y * y)
-    scale = bound / size if size > bound else 1.0
+    length = math.sqrt(x * x + y * y)
+    scale = bound / length if length > bound else 1.0
     return scale * x, scale * y
 
 
 @inlined
 def after_friction(x: float, y: float, friction: float) -> tuple[float, float]:
     """What Coulomb friction leaves of the command (x, y): nothing below it, the excess above."""
-    size = math.sqrt(x * x + y * y)
-    scale = 1.0 - friction / size if size > friction else 0.0
+    length = math.sqrt(x * x + y * y)
+    scale = 1.0 - friction / length if length > friction else 0.0
     return scale * x, scale * y
 
 
 @inlined
-def real_tip(rule: PlantRule, state: PlantState, desired: Vector) -> PlantState:
+def real_tip(rule: PlantParameters, state: PlantState, desired: Vector) -> PlantState:
     """One period of the real arm: steer toward the proxy, evert the rest (supplement, Sections 4 and 5).
 
     The steering error is that of the proxy p = d L_a / L_d of Eqs. (6), (7) against the tip, divided by
     L_a, in the plane: the angle for small errors. The motors are left out: Eq. (1) maps their commands back
     to this plane without loss.
     """
-    wanted = max(math.sqrt(desired[0] ** 2 + desired[1] ** 2 + desired[2] ** 2), rule.minimum_length)
+    wanted = max(size(desired), rule.minimum_length)
     tilt_bound = math.sin(rule.maximum_tilt)
     aim_x, aim_y = limited(desired[0] / wanted, desired[1] / wanted, tilt_bound)
     error_x, error_y = aim_x - state.direction_x, aim_y - state.direction_y
@@ -298,34 +273,22 @@ def real_tip(rule: PlantRule, state: PlantState, desired: Vector) -> PlantState:
 
 @inlined
 def plant_step(
-    rule: PlantRule, state: PlantState, delayed: NDArray[np.float64], desired: Vector
+    rule: PlantParameters, state: PlantState, delayed: NDArray[np.float64], desired: Vector
 ) -> PlantState:
     """One period of the arm; ``delayed`` (n, 3) is the ring buffer of commands on their way."""
     if not rule.real:
         tip = simulated_tip(state.tip, desired, rule.tip_lag)
         return PlantState(tip, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, state.sample + 1)
     place = state.sample % len(delayed)
-    arriving = (delayed[place, 0], delayed[place, 1], delayed[place, 2])
-    for axis in range(3):
-        delayed[place, axis] = desired[axis]
+    arriving = row(delayed, place)
+    set_row(delayed, place, desired)
     return real_tip(rule, state, arriving)
 
 
 @inlined
 def tracked_tip(tip: Vector, noise: float, rng: np.random.Generator) -> Vector:
     """The tip as motion capture reports it (Stroppa et al., Section 3.3.1)."""
-    if noise == 0.0:
-        return tip
-    return (
-        tip[0] + noise * rng.standard_normal(),
-        tip[1] + noise * rng.standard_normal(),
-        tip[2] + noise * rng.standard_normal(),
-    )
-
-
-def command_buffer(rule: PlantRule, tip: Vector) -> NDArray[np.float64]:
-    """Ring buffer of the commands on their way, filled with the position of rest."""
-    return np.tile(np.asarray(tip, dtype=float), (max(rule.command_delay, 1), 1))
+    return scattered(tip, noise, rng) if noise > 0.0 else tip
 
 
 class SoftGrowingPlant:
@@ -351,12 +314,12 @@ class SoftGrowingPlant:
     """
 
     def __init__(self, parameters: PlantParameters, tip: ArrayLike = (0.0, 0.0, 0.1)) -> None:
-        start = finite_point("tip", tip)
+        start = vector("tip", tip)
         if start[2] <= 0:
             raise ValueError(f"tip must hang below the base (z > 0), got z = {start[2]} m")
         self.rule = parameters.rule()
         self.state = plant_start(start)
-        self.delayed = command_buffer(self.rule, start)
+        self.delayed = delay_line(start, self.rule.command_delay)
 
     def step(self, desired: ArrayLike) -> NDArray[np.float64]:
         """Command a position (3,) [m] for one period and return the tip (3,) [m] after it.
@@ -366,17 +329,8 @@ class SoftGrowingPlant:
         ValueError
             If the command is not three finite numbers.
         """
-        self.state = plant_step(self.rule, self.state, self.delayed, finite_point("desired", desired))
+        self.state = plant_step(self.rule, self.state, self.delayed, vector("desired", desired))
         return np.array(self.state.tip)
-
-
-def finite_point(name: str, value: ArrayLike) -> Vector:
-    """Three finite numbers, or a ValueError that names the argument."""
-    array = np.asarray(value, dtype=float)
-    if array.shape != (3,) or not np.all(np.isfinite(array)):
-        raise ValueError(f"{name} must be three finite numbers, got {array.tolist()}")
-    x, y, z = array.tolist()
-    return x, y, z
 
 
 # --- The soft magnetic gripper: Section 3.1, Fig. 3 ---------------------------------------------------------
@@ -413,8 +367,7 @@ def nearest_item(items: NDArray[np.float64], point: Vector) -> tuple[int, float]
     """Number of the nearest item and its distance [m]."""
     best, least = NOTHING, math.inf
     for index in range(len(items)):
-        x, y, z = items[index, 0] - point[0], items[index, 1] - point[1], items[index, 2] - point[2]
-        distance = math.sqrt(x * x + y * y + z * z)
+        distance = size(difference(row(items, index), point))
         if distance < least:
             best, least = index, distance
     return best, least
