@@ -30,6 +30,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import finite, number
+
 FloatArray = NDArray[np.float64]
 
 # Below this squared bend the derivatives of S and C are summed as power series: there the closed forms would
@@ -45,6 +47,9 @@ _IDENTITY_ROWS: tuple[tuple[Any, ...], ...] = (
     (0.0, 0.0, 1.0, 0.0),
 )
 _LAST_ROW = (0.0, 0.0, 0.0, 1.0)
+
+ARCS = (..., "n >= 0", 3)
+"""Shape of a chain of arcs, or of many: n times (dx, dy, length)."""
 
 
 def arc_transform(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray:
@@ -80,7 +85,14 @@ def arc_transform(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray
     >>> arc_transform(np.pi / 2, 0.0, 0.1)[:3, 3].round(4)
     array([0.0637, 0.    , 0.0637])
     """
-    return chain_transform(_stack_arc(dx, dy, length))
+    named = {"dx": dx, "dy": dy, "length": length}
+    arrays = [finite(name, value) for name, value in named.items()]
+    try:
+        arc = np.stack(np.broadcast_arrays(*arrays), axis=-1)
+    except ValueError:
+        shapes = ", ".join(f"{name} {np.shape(value)}" for name, value in named.items())
+        raise ValueError(f"the shapes of dx, dy and length must broadcast, got {shapes}") from None
+    return chain_transform(arc[..., np.newaxis, :])
 
 
 def chain_transform(configuration: ArrayLike) -> FloatArray:
@@ -111,7 +123,7 @@ def chain_transform(configuration: ArrayLike) -> FloatArray:
     >>> chain_transform([[0.0, 0.0, 0.12], [0.0, 0.0, 0.24]])[:3, 3]
     array([0.  , 0.  , 0.36])
     """
-    arcs = _as_configuration(configuration)
+    arcs = finite("configuration", configuration, ARCS)
     if arcs.ndim == 2:
         rows = _IDENTITY_ROWS
         for arc in _scalar_arcs(arcs):
@@ -121,29 +133,6 @@ def chain_transform(configuration: ArrayLike) -> FloatArray:
     for arcs_of_segment in _batch_arcs(arcs):
         frame = carry(frame, arcs_of_segment)
     return _pack_transform(frame, arcs.shape[:-2])
-
-
-def arc_jacobian(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return the Jacobian of the end of an arc with respect to (dx, dy, length).
-
-    Parameters
-    ----------
-    dx, dy : array_like, shape (...)
-        Components of the bending angle [rad].
-    length : array_like, shape (...)
-        Arc length [m].
-
-    Returns
-    -------
-    ndarray, shape (..., 6, 3)
-        Rows: linear velocity [m], angular velocity [rad] of the end, both in the frame of the start.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, or the shapes do not broadcast.
-    """
-    return chain_jacobian(_stack_arc(dx, dy, length))
 
 
 def chain_jacobian(configuration: ArrayLike) -> FloatArray:
@@ -170,7 +159,7 @@ def chain_jacobian(configuration: ArrayLike) -> FloatArray:
 
 def chain_transform_and_jacobian(configuration: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return :func:`chain_transform` and :func:`chain_jacobian` from one pass along the chain."""
-    arcs = _as_configuration(configuration)
+    arcs = finite("configuration", configuration, ARCS)
     if arcs.ndim == 2:
         return _scalar_transform_and_jacobian(arcs)
     return _batch_transform_and_jacobian(arcs)
@@ -196,9 +185,8 @@ def backbone(configuration: ArrayLike, points_per_segment: int = 20) -> FloatArr
     ValueError
         If the configuration is malformed or `points_per_segment` is below 1.
     """
-    if points_per_segment < 1:
-        raise ValueError(f"points_per_segment must be at least 1, got {points_per_segment}")
-    arcs = _as_configuration(configuration)
+    number("points_per_segment", points_per_segment, at_least=1)
+    arcs = finite("configuration", configuration, ARCS)
     frame = _identity_frame(arcs)
     points = [frame[3][..., np.newaxis]]
     fractions = np.arange(1, points_per_segment + 1) / points_per_segment
@@ -231,31 +219,6 @@ def routing_matrix(radius: float, angles: ArrayLike) -> FloatArray:
     """
     angles = np.asarray(angles, dtype=float)
     return np.stack([-radius * np.cos(angles), -radius * np.sin(angles), np.ones_like(angles)], axis=-1)
-
-
-def _stack_arc(dx: ArrayLike, dy: ArrayLike, length: ArrayLike) -> FloatArray:
-    named = {"dx": dx, "dy": dy, "length": length}
-    for name, value in named.items():
-        if not np.isfinite(np.asarray(value, dtype=float)).all():
-            raise ValueError(f"{name} must be finite, got {value!r}")
-    try:
-        return np.stack(np.broadcast_arrays(dx, dy, length), axis=-1, dtype=float)[..., np.newaxis, :]
-    except ValueError:
-        shapes = ", ".join(f"{name} {np.shape(value)}" for name, value in named.items())
-        raise ValueError(f"the shapes of dx, dy and length must broadcast, got {shapes}") from None
-
-
-def _as_configuration(configuration: ArrayLike) -> FloatArray:
-    try:
-        arcs = np.asarray(configuration, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"configuration must be numbers of shape (..., n, 3): {error}") from None
-    if arcs.ndim < 2 or arcs.shape[-1] != 3:
-        raise ValueError(f"configuration must have shape (..., n, 3) of (dx, dy, length), got {arcs.shape}")
-    if not np.isfinite(arcs).all():
-        where = tuple(int(index) for index in np.argwhere(~np.isfinite(arcs))[0])
-        raise ValueError(f"configuration must be finite, got {arcs[where]} at index {where}")
-    return arcs
 
 
 def carry(row: Sequence[Any], arc: Sequence[Any]) -> tuple[Any, ...]:

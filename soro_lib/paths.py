@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
+from soro_lib.checks import finite, positive
+
 FloatArray = NDArray[np.float64]
 
 A4_PAPER = (0.297, 0.210)
@@ -16,8 +18,8 @@ A4_PAPER = (0.297, 0.210)
 
 def circle(turns: ArrayLike, radius: float) -> FloatArray:
     """Return points on a circle, counter-clockwise from +x, shape (..., 2): Wang et al., Section IV-D."""
-    angle = 2.0 * np.pi * _as_finite(turns, "turns")
-    return _positive(radius, "radius") * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    angle = 2.0 * np.pi * finite("turns", turns)
+    return positive("radius", radius) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def infinity(turns: ArrayLike, half_width: float) -> FloatArray:
@@ -30,8 +32,8 @@ def infinity(turns: ArrayLike, half_width: float) -> FloatArray:
     half_width : float
         Distance from the crossing to the outermost point of either loop.
     """
-    angle = 2.0 * np.pi * _as_finite(turns, "turns")
-    x = _positive(half_width, "half_width") * np.sin(angle) / (1.0 + np.cos(angle) ** 2)
+    angle = 2.0 * np.pi * finite("turns", turns)
+    x = positive("half_width", half_width) * np.sin(angle) / (1.0 + np.cos(angle) ** 2)
     return np.stack([x, x * np.cos(angle)], axis=-1)
 
 
@@ -47,9 +49,9 @@ def spiral(fraction: ArrayLike, radius: float, turns: float) -> FloatArray:
     turns : float
         Cycles in the whole spiral, counter-clockwise if positive.
     """
-    share = _as_fraction(fraction)
+    share = finite("fraction", fraction, at_least=0, at_most=1)
     angle = 2.0 * np.pi * turns * share
-    reach = _positive(radius, "radius") * np.sqrt(share)
+    reach = positive("radius", radius) * np.sqrt(share)
     return np.stack([reach * np.cos(angle), reach * np.sin(angle)], axis=-1)
 
 
@@ -63,12 +65,12 @@ def polygon(turns: ArrayLike, vertices: ArrayLike) -> FloatArray:
     vertices : array_like, shape (n, d)
         Corners in order, the first not repeated; n >= 2.
     """
-    corners = _as_vertices(vertices, 2)
+    corners = finite("vertices", vertices, ("n >= 2", "d"))
     closed = np.concatenate([corners, corners[:1]])
     travelled = np.concatenate([[0.0], np.linalg.norm(np.diff(closed, axis=0), axis=-1).cumsum()])
     if travelled[-1] == 0.0:
         raise ValueError("vertices must not all coincide")
-    distance = np.mod(_as_finite(turns, "turns"), 1.0) * travelled[-1]
+    distance = np.mod(finite("turns", turns), 1.0) * travelled[-1]
     return np.stack([np.interp(distance, travelled, column) for column in closed.T], axis=-1)
 
 
@@ -78,7 +80,7 @@ def pentagram(turns: ArrayLike, radius: float) -> FloatArray:
     The first point of the star is at +y, at distance `radius` from the centre.
     """
     angle = np.pi / 2.0 + 4.0 * np.pi / 5.0 * np.arange(5)
-    return polygon(turns, _positive(radius, "radius") * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
+    return polygon(turns, positive("radius", radius) * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
 
 def rectangle(turns: ArrayLike, width: float = A4_PAPER[0], height: float = A4_PAPER[1]) -> FloatArray:
@@ -86,7 +88,7 @@ def rectangle(turns: ArrayLike, width: float = A4_PAPER[0], height: float = A4_P
 
     Counter-clockwise from the corner (-width/2, -height/2).
     """
-    x, y = 0.5 * _positive(width, "width"), 0.5 * _positive(height, "height")
+    x, y = 0.5 * positive("width", width), 0.5 * positive("height", height)
     return polygon(turns, [(-x, -y), (x, -y), (x, y), (-x, y)])
 
 
@@ -106,7 +108,7 @@ def closed_curve(turns: ArrayLike, points: ArrayLike, samples: int = 4096) -> Fl
     -----
     A periodic cubic spline over the chord lengths, reparametrised by arc length.
     """
-    knots = _as_vertices(points, 3)
+    knots = finite("points", points, ("n >= 3", "d"))
     closed = np.concatenate([knots, knots[:1]])
     chords = np.linalg.norm(np.diff(closed, axis=0), axis=-1)
     if not (chords > 0.0).all():
@@ -115,7 +117,7 @@ def closed_curve(turns: ArrayLike, points: ArrayLike, samples: int = 4096) -> Fl
     parameter = np.linspace(0.0, chords.sum(), samples + 1)
     steps = np.linalg.norm(np.diff(spline(parameter), axis=0), axis=-1)
     travelled = np.concatenate([[0.0], steps.cumsum()])
-    distance = np.mod(_as_finite(turns, "turns"), 1.0) * travelled[-1]
+    distance = np.mod(finite("turns", turns), 1.0) * travelled[-1]
     return np.asarray(spline(np.interp(distance, travelled, parameter)), dtype=float)
 
 
@@ -132,54 +134,5 @@ def minimum_jerk(fraction: ArrayLike) -> FloatArray:
     ndarray, shape (...)
         ``10 t^3 - 15 t^4 + 6 t^5``: from 0 to 1, at rest and without acceleration at both ends.
     """
-    t = _as_fraction(fraction)
+    t = finite("fraction", fraction, at_least=0, at_most=1)
     return t**3 * (10.0 + t * (-15.0 + 6.0 * t))
-
-
-def path_deviation(positions: ArrayLike, path: ArrayLike) -> FloatArray:
-    """Return the distance of positions from a path, shape (...): the deviation of Wang et al., Section IV-D.
-
-    Parameters
-    ----------
-    positions : array_like, shape (..., d)
-        Measured positions.
-    path : array_like, shape (n, d)
-        Points of the path in order, n >= 2, joined by straight lines; repeat the first point to close it.
-    """
-    points, corners = np.asarray(positions, dtype=float), _as_vertices(path, 2)
-    if points.shape[-1:] != corners.shape[1:] or not np.isfinite(points).all():
-        raise ValueError(f"positions must be finite, of shape (..., {corners.shape[1]}), got {points.shape}")
-    start, along = corners[:-1], np.diff(corners, axis=0)
-    square = (along**2).sum(axis=-1)
-    offset = points[..., np.newaxis, :] - start
-    projected = (offset * along).sum(axis=-1)
-    share = np.divide(projected, square, out=np.zeros_like(projected), where=square > 0.0)
-    apart = offset - np.clip(share, 0.0, 1.0)[..., np.newaxis] * along
-    return np.sqrt((apart**2).sum(axis=-1).min(axis=-1))
-
-
-def _as_finite(value: ArrayLike, name: str) -> FloatArray:
-    array = np.asarray(value, dtype=float)
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite")
-    return array
-
-
-def _as_fraction(fraction: ArrayLike) -> FloatArray:
-    share = np.asarray(fraction, dtype=float)
-    if not ((share >= 0.0) & (share <= 1.0)).all():
-        raise ValueError("fraction must be in [0, 1]")
-    return share
-
-
-def _as_vertices(vertices: ArrayLike, least: int) -> FloatArray:
-    corners = np.asarray(vertices, dtype=float)
-    if corners.ndim != 2 or len(corners) < least or not np.isfinite(corners).all():
-        raise ValueError(f"at least {least} finite points of shape (n, d) are needed, got {corners.shape}")
-    return corners
-
-
-def _positive(value: float, name: str) -> float:
-    if not (np.isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} must be finite and positive, got {value!r}")
-    return value

@@ -4,6 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
+from soro_lib.checks import increasing
+
 Array = NDArray[np.float64]
 
 
@@ -25,12 +27,8 @@ class ActuationMap:
     """
 
     def __init__(self, motor_lengths: ArrayLike, chamber_lengths: ArrayLike) -> None:
-        motor, chamber = np.asarray(motor_lengths, dtype=float), np.asarray(chamber_lengths, dtype=float)
-        if motor.ndim != 1 or motor.shape != chamber.shape or len(motor) < 2:
-            raise ValueError(f"expected two equal lists of n >= 2, got {motor.shape} and {chamber.shape}")
-        for name, values in (("motor_lengths", motor), ("chamber_lengths", chamber)):
-            if not (np.isfinite(values).all() and (np.diff(values) > 0.0).all()):
-                raise ValueError(f"{name} must be finite and increase strictly")
+        motor = increasing("motor_lengths", motor_lengths, ("n >= 2",))
+        chamber = increasing("chamber_lengths", chamber_lengths, motor.shape)
         self._motor, self._chamber = motor, chamber
         self._forward = PchipInterpolator(motor, chamber)
         self._backward = PchipInterpolator(chamber, motor)

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.controllers.gestures import GestureRule, Mode
+from soro_lib.checks import check_fields, finite
+from soro_lib.controllers.gestures import Gesture, GestureRule
 from soro_lib.controllers.hand_gate import GatedHand, GateSettings, HandGate
 from soro_lib.controllers.hand_mapping import PalmMapping, TipGoal, Vector
 from soro_lib.controllers.obstacles import Sphere, clearances
@@ -93,22 +94,9 @@ class SteeringSettings:
     margin: float | None = None
 
     def __post_init__(self) -> None:
-        positive = (
-            "direction_time_constant",
-            "tip_speed",
-            "turn_rate",
-            "cable_rate",
-            "slide_speed",
-            "longest_interval",
-        )
-        for name in (*positive, "iterations"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"SteeringSettings.{name} = {value}, must be finite and > 0")
-        if not 0 <= self.minimum_tension < 1:
-            raise ValueError(
-                f"SteeringSettings.minimum_tension = {self.minimum_tension}, must be in [0, 1) N"
-            )
+        speeds = ("tip_speed", "turn_rate", "cable_rate", "slide_speed")
+        check_fields(self, *speeds, "direction_time_constant", "longest_interval", "iterations", above=0)
+        check_fields(self, "minimum_tension", at_least=0, below=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +109,7 @@ class SteeringResult:
         Of the frame [s].
     actuation : ndarray (n,)
         Command to the arm, always within its limits.
-    mode : Mode
+    mode : Gesture
         Gesture mode in force.
     converged : bool
         Whether the frame was sound and the least squares solved.
@@ -139,7 +127,7 @@ class SteeringResult:
 
     time: float
     actuation: Array
-    mode: Mode
+    mode: Gesture
     converged: bool
     reason: str
     goal: TipGoal
@@ -200,9 +188,7 @@ class GestureSteering:
 
     def reset(self, actuation: ArrayLike) -> None:
         """Start anew at an actuation (n,); it is moved into the limits."""
-        self.actuation: Array = np.clip(np.asarray(actuation, dtype=float), self._lower, self._upper)
-        if not np.isfinite(self.actuation).all():
-            raise ValueError(f"GestureSteering: actuation = {actuation!r}, must be finite")
+        self.actuation = finite("actuation", np.clip(actuation, self._lower, self._upper))
         self.pose = self._kinematics(self.actuation)
         self._gate = HandGate(self.settings.mapping, self.settings.gate)
         self._gesture = GestureRule(self.settings.gesture_hold, self.settings.opposite_hold)
@@ -211,7 +197,7 @@ class GestureSteering:
         self._direction.reset(self.pose.direction)
         self._hand: tuple[Vector, Vector] | None = None  # palm [m] and normal that are followed, device frame
         self._target, self._locked_mid = self.pose.tip, self.pose.mid
-        self._mode = Mode.PALM
+        self._mode = Gesture.PALM
         self._time: float | None = None
 
     def update(self, hand_sample: HandSample) -> SteeringResult:
@@ -258,17 +244,17 @@ class GestureSteering:
             palm = self._palm.predicted(time).tolist() if recent else self._hand[0]
             self._hand = (palm, self._hand[1]) if self.settings.mapping.in_box(palm) else self._hand
 
-    def _goal(self, mode: Mode) -> TipGoal:
+    def _goal(self, mode: Gesture) -> TipGoal:
         """Return what the hand asks for under the mode; before the first hand, to stay."""
         if self._hand is None:
             return TipGoal(tuple(self.pose.tip.tolist()), tuple(self.pose.direction.tolist()))
         return self.settings.mapping.goal(*self._hand, mode)
 
-    def _change(self, mode: Mode) -> None:
+    def _change(self, mode: Gesture) -> None:
         """On entering the fist, lock the mid point; on leaving it, turn on from where the tip points now."""
-        if mode is Mode.FIST and self._mode is not Mode.FIST:
+        if mode is Gesture.FIST and self._mode is not Gesture.FIST:
             self._locked_mid = self.pose.mid
-        elif mode is not Mode.FIST and self._mode is Mode.FIST:
+        elif mode is not Gesture.FIST and self._mode is Gesture.FIST:
             self._direction.reset(self.pose.direction)
         self._mode = mode
 
@@ -278,7 +264,7 @@ class GestureSteering:
             np.subtract(goal.position, self._target), self.settings.tip_speed * interval
         )
 
-    def _stepped(self, mode: Mode, interval: float) -> Step:
+    def _stepped(self, mode: Gesture, interval: float) -> Step:
         """Solve for the step of the actuation and take it."""
         share = interval / self.settings.iterations
         for _ in range(self.settings.iterations):
@@ -288,7 +274,7 @@ class GestureSteering:
             self._take(step.actuation_step, share)
         return step
 
-    def _solved(self, mode: Mode, interval: float) -> Step:
+    def _solved(self, mode: Gesture, interval: float) -> Step:
         settings, pose = self.settings, self.pose
         reach = self._rates * interval
         lower = np.maximum(self._lower - self.actuation, -reach)
@@ -296,7 +282,7 @@ class GestureSteering:
         position_step = _shortened(self._target - pose.tip, settings.tip_speed * interval)
         direction_step = _shortened(self._direction.direction - pose.direction, settings.turn_rate * interval)
         bounds = StepBounds(lower, upper, self._units)
-        if mode is Mode.FIST:
+        if mode is Gesture.FIST:
             mid_step = self._locked_mid - pose.mid
             problem = locked_step(pose, position_step, mid_step, direction_step, bounds, settings.weights)
         elif settings.obstacles:

@@ -9,8 +9,10 @@ import math
 from collections.abc import Sequence
 from enum import StrEnum
 
+from soro_lib.checks import not_negative
 
-class Mode(StrEnum):
+
+class Gesture(StrEnum):
     """The four modes of Lai et al., Fig. 4."""
 
     PALM = "palm"
@@ -19,11 +21,11 @@ class Mode(StrEnum):
     FIST = "fist"
 
 
-GESTURES: dict[tuple[bool, ...], Mode] = {
-    (True, True, True, True, True): Mode.PALM,
-    (False, True, True, False, False): Mode.V_SIGN,
-    (True, False, False, False, False): Mode.THUMBS_UP,
-    (False, False, False, False, False): Mode.FIST,
+GESTURES: dict[tuple[bool, ...], Gesture] = {
+    (True, True, True, True, True): Gesture.PALM,
+    (False, True, True, False, False): Gesture.V_SIGN,
+    (True, False, False, False, False): Gesture.THUMBS_UP,
+    (False, False, False, False, False): Gesture.FIST,
 }
 """Mode by the vector of extended fingers (thumb, index, middle, ring, pinky); Lai et al., Eqs. (17), (18)."""
 
@@ -50,22 +52,20 @@ class GestureRule:
     """
 
     def __init__(self, hold: float = 0.13, opposite_hold: float = 0.25) -> None:
-        for name, value in (("hold", hold), ("opposite_hold", opposite_hold)):
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"GestureRule.{name} = {value}, must be finite and >= 0")
-        self.hold, self.opposite_hold = hold, opposite_hold
-        self.mode = Mode.PALM
-        self._candidate: Mode | None = None
+        self.hold = not_negative("GestureRule.hold", hold)
+        self.opposite_hold = not_negative("GestureRule.opposite_hold", opposite_hold)
+        self.mode = Gesture.PALM
+        self._candidate: Gesture | None = None
         self._since = self._seen = -math.inf
 
-    def update(self, time: float, fingers: Sequence[bool]) -> Mode:
+    def update(self, time: float, fingers: Sequence[bool]) -> Gesture:
         """Take in the finger vector of one frame at ``time`` [s] and return the mode."""
         candidate = GESTURES.get(tuple(fingers))
         if candidate != self._candidate or time - self._seen > max(self.hold, 0.1):
             self._candidate, self._since = candidate, time
         self._seen = time
         if candidate is not None and candidate != self.mode:
-            opposite = {candidate, self.mode} == {Mode.FIST, Mode.THUMBS_UP}
+            opposite = {candidate, self.mode} == {Gesture.FIST, Gesture.THUMBS_UP}
             if time - self._since >= (self.opposite_hold if opposite else self.hold):
                 self.mode = candidate
         return self.mode

@@ -8,8 +8,9 @@ Section IV-A).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
+from soro_lib.checks import check_fields
 from soro_lib.controllers.hand_mapping import PalmMapping, Vector
 from soro_lib.sensing.hand_tracking import NORMAL_LENGTH, HandSample
 
@@ -43,10 +44,7 @@ class GateSettings:
     velocity_after: int = 2
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"GateSettings.{field.name} = {value}, must be finite and > 0")
+        check_fields(self, above=0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from soro_lib.controllers.gestures import Mode
-
-Vector = tuple[float, float, float]
+from soro_lib.checks import Vector, check_fields
+from soro_lib.controllers.gestures import Gesture
 
 
 class TipGoal(NamedTuple):
@@ -58,19 +57,11 @@ class PalmMapping:
     tilt_loss: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("scale_x", "scale_y", "scale_z", "offset"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"PalmMapping.{name} = {getattr(self, name)}, must be finite")
-        if not 0 < self.half_width < math.inf:
-            raise ValueError(f"PalmMapping.half_width = {self.half_width}, must be > 0 and finite")
-        if not 0 < self.lowest < self.highest < math.inf:
-            raise ValueError(
-                f"PalmMapping: 0 < lowest < highest must hold, got {self.lowest}, {self.highest}"
-            )
-        if not 0 < self.maximum_tilt < math.pi / 2:
-            raise ValueError(f"PalmMapping.maximum_tilt = {self.maximum_tilt}, must be in (0, pi/2)")
-        if not 0 <= self.tilt_loss < math.inf:
-            raise ValueError(f"PalmMapping.tilt_loss = {self.tilt_loss}, must be >= 0 and finite")
+        check_fields(self, "scale_x", "scale_y", "scale_z", "offset")
+        check_fields(self, "half_width", "highest", above=0)
+        check_fields(self, "lowest", above=0, below=self.highest)
+        check_fields(self, "maximum_tilt", above=0, below=math.pi / 2)
+        check_fields(self, "tilt_loss", at_least=0)
 
     def in_box(self, palm: Vector) -> bool:
         """Return whether the palm [m, device frame] is where the paper allows it (Section IV-A)."""
@@ -92,7 +83,7 @@ class PalmMapping:
         x, y, z = normal
         return x, -z, -y
 
-    def goal(self, palm: Vector, normal: Vector, mode: Mode = Mode.PALM) -> TipGoal:
+    def goal(self, palm: Vector, normal: Vector, mode: Gesture = Gesture.PALM) -> TipGoal:
         """Return the goal of a hand under a mode, with its tilt limited."""
         goal = constrained_goal(mode, TipGoal(self.position(palm), self.direction(normal)))
         return goal._replace(direction=limited_tilt(goal.direction, self.tilt_limit(goal.position)))
@@ -119,14 +110,14 @@ def limited_tilt(direction: Vector, maximum: float) -> Vector:
     return x * scale, y * scale, math.cos(maximum)
 
 
-def constrained_goal(mode: Mode, goal: TipGoal) -> TipGoal:
+def constrained_goal(mode: Gesture, goal: TipGoal) -> TipGoal:
     """Apply the constraint of a mode to a goal; G_sign in Lai et al., Eqs. (19), (20).
 
     The printed matrices do not do what the text says (erratum GS-13); the text is followed: V-sign and
     thumbs-up keep only the height, thumbs-up points straight. Palm and fist leave the goal as it is.
     """
-    if mode is Mode.V_SIGN:
+    if mode is Gesture.V_SIGN:
         return TipGoal((0.0, 0.0, goal.position[2]), goal.direction)
-    if mode is Mode.THUMBS_UP:
+    if mode is Gesture.THUMBS_UP:
         return TipGoal((0.0, 0.0, goal.position[2]), (0.0, 0.0, 1.0))
     return goal

@@ -11,6 +11,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields
 from soro_lib.controllers.virtual_stiffness import VirtualStiffnessController
 from soro_lib.estimators.handover_filters import APPENDIX_A, FilterParameters, HandoverFilters
 from soro_lib.estimators.shape_estimation import POSE_WEIGHTS, ShapeEstimate, estimate_shape
@@ -79,11 +80,8 @@ class SafetyRules:
     retreat_share: float = 0.1
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be positive, got {value}")
-        if self.retreat_share > 1:
-            raise ValueError(f"retreat_share must be at most 1, got {self.retreat_share}")
+        check_fields(self, above=0)
+        check_fields(self, "retreat_share", at_most=1)
 
 
 @dataclass(frozen=True)
@@ -129,14 +127,9 @@ class HandoverParameters:
     motors: TendonMotors = field(default_factory=TendonMotors)
 
     def __post_init__(self) -> None:
-        for name in ("pose_bound", "stop_threshold"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        for name in ("pose_bound_share", "bend_softening", "grasp_offset"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise ValueError(f"{name} must be at least 0, got {getattr(self, name)}")
-        if len(self.pose_weights) != 9 or not all(w > 0 for w in self.pose_weights):
-            raise ValueError(f"pose_weights must be nine positive numbers, got {self.pose_weights}")
+        check_fields(self, "pose_bound", "stop_threshold", above=0)
+        check_fields(self, "pose_bound_share", "bend_softening", "grasp_offset", at_least=0)
+        check_fields(self, "pose_weights", shape=(9,), above=0)
 
 
 @dataclass(frozen=True)
@@ -247,7 +240,7 @@ class HandoverController:
         Whatever is seen, the command stays within the arm's and the motors' limits; see :class:`SafetyRules`.
         """
         if self.mode in (Mode.GRASP, Mode.RELEASE, Mode.STOPPED):
-            return self._command(self.mode, self._retreat_reason)
+            return self._command(self._retreat_reason)
         if self.mode is Mode.RETREAT:
             return self._retreat(self._retreat_reason)
         looked, reason = self._believable(observation)
@@ -275,7 +268,7 @@ class HandoverController:
         self.q_sys = step.q_sys
         self._held = 0
         self.mode = self._task_mode
-        return self._command(self.mode, "", error, estimate, measured, goal, step.crops)
+        return self._command("", error, estimate, measured, goal, step.crops)
 
     def _estimate(self, measured: NDArray[np.float64]) -> ShapeEstimate:
         """Return ``q_est`` = SOF(q_sys, X_meas), Eq. (16); or q_sys itself where the optimisation is left
@@ -307,7 +300,7 @@ class HandoverController:
         self, measured: NDArray[np.float64], goal: NDArray[np.float64], error: float
     ) -> HandoverCommand:
         self._enter(Mode.RELEASE if self._task_mode is Mode.CARRY else Mode.GRASP)
-        return self._command(self.mode, "", error, None, measured, goal)
+        return self._command("", error, None, measured, goal)
 
     def _enter(self, mode: Mode) -> None:
         """Begin a stage of the task: the gripper closes to grasp and carry, and opens to release."""
@@ -384,7 +377,7 @@ class HandoverController:
         if self._held > self.parameters.safety.hold_limit:
             return self._retreat(f"held for {self.parameters.safety.hold_limit} steps: {reason}")
         self.mode = Mode.HOLD
-        return self._command(Mode.HOLD, reason)
+        return self._command(reason)
 
     def _retreat(self, reason: str) -> HandoverCommand:
         """Go home open loop: a straight way within the limits, which are convex in `q_sys`, with an open
@@ -396,11 +389,10 @@ class HandoverController:
         if np.abs(self.q_sys - self.arm.home).max() < 0.01:
             self.q_sys = self.arm.home.copy()
             self.mode = Mode.STOPPED
-        return self._command(self.mode, reason)
+        return self._command(reason)
 
     def _command(
         self,
-        mode: Mode,
         reason: str,
         error: float = np.nan,
         estimate: ShapeEstimate | None = None,
@@ -414,7 +406,7 @@ class HandoverController:
         return HandoverCommand(
             tendon_change=clipped,
             gripper_closed=self.gripper_closed,
-            mode=mode,
+            mode=self.mode,
             reason=reason,
             error=error,
             q_sys=self.q_sys.copy(),

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields, finite, one_of
 from soro_lib.estimators.gaussian_process import RollingGaussianProcess
 from soro_lib.robots.base import Robot
 
@@ -158,19 +159,13 @@ class HybridSettings:
 
     def __post_init__(self) -> None:
         """Check the values; the error names the field and its bound."""
-        gain = np.asarray(self.proportional_gain, dtype=float)
-        if not (np.isfinite(gain).all() and (gain > 0.0).all() and (gain <= 2.0).all()):
-            raise ValueError(f"proportional_gain must lie in (0, 2], got {gain}")
-        if not self.maximum_step > 0.0:
-            raise ValueError(f"maximum_step must be above 0, got {self.maximum_step}")
+        gain = finite("proportional_gain", self.proportional_gain, above=0, at_most=2)
+        check_fields(self, "maximum_step", above=0, at_most=np.inf)
         if not (self.null_gain >= 0.0 and (gain * self.null_gain < 2.0).all()):
             raise ValueError(f"null_gain must satisfy 0 <= K_p beta < 2, got {self.null_gain}")
-        if self.compensation not in COMPENSATIONS:
-            raise ValueError(f"compensation must be one of {COMPENSATIONS}, got {self.compensation!r}")
-        if self.trained_on not in ("desired", "actual"):
-            raise ValueError(f"trained_on must be 'desired' or 'actual', got {self.trained_on!r}")
-        if not 1 <= self.warm_up <= self.window:
-            raise ValueError(f"warm_up must lie in [1, window={self.window}], got {self.warm_up}")
+        one_of("compensation", self.compensation, COMPENSATIONS)
+        one_of("trained_on", self.trained_on, ("desired", "actual"))
+        check_fields(self, "warm_up", at_least=1, at_most=self.window)
 
     @property
     def learns(self) -> bool:
@@ -267,11 +262,9 @@ class HybridController:
         ValueError
             If an input is not finite or out of the arm's limits; nothing has been learned then.
         """
-        position, goal = np.asarray(end_effector, dtype=float), np.asarray(goal, dtype=float)
+        position = finite("end_effector", end_effector, (..., 2))
+        goal = finite("goal", goal, (..., 2))
         lengths = np.asarray(lengths, dtype=float)
-        for name, value in (("end_effector", position), ("goal", goal)):
-            if value.shape[-1:] != (2,) or not np.isfinite(value).all():
-                raise ValueError(f"{name} must be finite and (..., 2), got {value}")
         jacobian = self.robot.jacobian(lengths)[..., :2, :]
         if self.settings.learns:
             self._learn(position)

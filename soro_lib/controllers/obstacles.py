@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.arcs import backbone, chain_transform_and_jacobian
+from soro_lib.checks import check_fields
 from soro_lib.controllers.steering_step import Clearance
 from soro_lib.robots.base import Robot
 
@@ -32,10 +32,8 @@ class Sphere:
     radius: float
 
     def __post_init__(self) -> None:
-        if len(self.centre) != 3 or not all(map(math.isfinite, self.centre)):
-            raise ValueError(f"Sphere.centre = {self.centre}, must be 3 finite numbers")
-        if not 0 < self.radius < math.inf:
-            raise ValueError(f"Sphere.radius = {self.radius}, must be > 0 and finite")
+        check_fields(self, "centre", shape=(3,))
+        check_fields(self, "radius", above=0)
 
 
 def clearances(

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,6 +21,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields
 from soro_lib.robots.cable_driven_kernels import Kinematics
 
 if TYPE_CHECKING:
@@ -63,10 +64,7 @@ class StepWeights:
     avoidance: float = 0.0
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"StepWeights.{item.name} = {value}, must be finite and >= 0")
+        check_fields(self, at_least=0)
         if self.damping == 0 or self.slide_damping == 0:
             raise ValueError(
                 "StepWeights.damping and slide_damping must be > 0: without them the step is not unique"

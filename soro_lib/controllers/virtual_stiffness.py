@@ -17,12 +17,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields, finite, one_of
 from soro_lib.poses import magnitude
 from soro_lib.robots.helix import HelixArm
 from soro_lib.robots.helix_kernels import (
     cholesky,
     cholesky_solve,
     dot,
+    kernel_vector,
     largest,
     multiply,
     outer_gram,
@@ -165,10 +167,8 @@ def limit_state(q: ArrayLike, inverse_stiffness: ArrayLike, arm: HelixArm = HELI
     >>> q[:3].round(3).tolist(), softness[:3].tolist()
     ([0.785, 0.0, 0.14], [0.01, 1.0, 0.01])
     """
-    state = np.array(q, dtype=float)
+    state = finite("q", q, (9,)).copy()
     softness = np.array(inverse_stiffness, dtype=float)
-    if state.shape != (9,) or not np.isfinite(state).all():
-        raise ValueError(f"q must be nine finite numbers, got {q!r}")
     if softness.shape not in ((9,), (9, 9)):
         raise ValueError(f"inverse_stiffness must have shape (9,) or (9, 9), got {softness.shape}")
     diagonal = softness.diagonal().copy() if softness.ndim == 2 else softness
@@ -358,20 +358,13 @@ class VirtualStiffnessController:
     arm: HelixArm = HELIX
 
     def __post_init__(self) -> None:
-        if not callable(self.step_size) and not 0 < self.step_size <= 1.5:
-            raise ValueError(f"step_size must be in (0, 1.5], got {self.step_size}")
-        if len(self.stiffness) != 9 or not np.all(np.asarray(self.stiffness) > 0):
-            raise ValueError(f"stiffness must be nine positive numbers, got {self.stiffness}")
-        if not (np.isfinite(self.tolerance) and self.tolerance > 0):
-            raise ValueError(f"tolerance must be positive, got {self.tolerance}")
-        if self.max_iterations < 1:
-            raise ValueError(f"max_iterations must be at least 1, got {self.max_iterations}")
-        if self.inner_loop not in ("all", "early exit"):
-            raise ValueError(f"inner_loop must be 'all' or 'early exit', got {self.inner_loop!r}")
-        if self.error_reference not in ("estimate", "measurement"):
-            raise ValueError(
-                f"error_reference must be 'estimate' or 'measurement', got {self.error_reference!r}"
-            )
+        if not callable(self.step_size):
+            check_fields(self, "step_size", above=0, at_most=1.5)
+        check_fields(self, "stiffness", shape=(9,), above=0)
+        check_fields(self, "tolerance", above=0)
+        check_fields(self, "max_iterations", at_least=1)
+        one_of("inner_loop", self.inner_loop, ("all", "early exit"))
+        one_of("error_reference", self.error_reference, ("estimate", "measurement"))
 
     def update(
         self, q_sys: ArrayLike, q_est: ArrayLike, goal_points: ArrayLike, measured_points: ArrayLike
@@ -391,18 +384,9 @@ class VirtualStiffnessController:
         ValueError
             If an argument has the wrong shape or is not finite.
         """
-        arrays = []
-        for name, values, size in (
-            ("q_sys", q_sys, 9),
-            ("q_est", q_est, 9),
-            ("goal_points", goal_points, 6),
-            ("measured_points", measured_points, 6),
-        ):
-            array = np.array(values, dtype=float)
-            if array.shape != (size,) or not np.isfinite(array).all():
-                raise ValueError(f"{name} must be {size} finite numbers, got {values!r}")
-            arrays.append(array)
-        commanded, estimated, goal, measured = arrays
+        commanded, estimated = kernel_vector("q_sys", q_sys, 9), kernel_vector("q_est", q_est, 9)
+        goal = kernel_vector("goal_points", goal_points, 6)
+        measured = kernel_vector("measured_points", measured_points, 6)
         step_size = self.step_size
         if callable(step_size):
             step_size = step_size(magnitude(goal - measured))

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.blas import dsymv, dsyr
 
+from soro_lib.checks import finite, number, numbers, positive
 from soro_lib.poses import align_quaternion
 
 Array = NDArray[np.float64]
@@ -159,22 +160,16 @@ class ExtremeLearningMachine:
         forgetting: float = 0.999,
         maximum_trace: float = 1e7,
     ) -> None:
-        if inputs < 1 or hidden < 1:
-            raise ValueError(f"inputs and hidden must be at least 1, got {inputs} and {hidden}")
-        if not 0.0 < width_range[0] <= width_range[1]:
-            raise ValueError(f"width_range must be increasing and above 0, got {width_range}")
-        for name, value in (("input_scale", input_scale), ("regularisation", regularisation)):
-            if not (np.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} must be finite and above 0, got {value}")
-        if not 0.0 < forgetting <= 1.0:
-            raise ValueError(f"forgetting must lie in (0, 1], got {forgetting}")
-        if not maximum_trace > 0.0:
-            raise ValueError(f"maximum_trace must be above 0, got {maximum_trace}")
+        number("inputs", inputs, at_least=1)
+        number("hidden", hidden, at_least=1)
+        number("width_range[0]", width_range[0], above=0, at_most=width_range[1])
+        number("forgetting", forgetting, above=0, at_most=1)
+        number("maximum_trace", maximum_trace, above=0, at_most=math.inf)
         self.centres = rng.uniform(-1.0, 1.0, (hidden, inputs))
         self.widths = rng.uniform(*width_range, hidden) * inputs
         self._nodes = self.centres.T, np.vecdot(self.centres, self.centres), -self.widths
-        self.input_scale = input_scale
-        self.regularisation = regularisation
+        self.input_scale = positive("input_scale", input_scale)
+        self.regularisation = positive("regularisation", regularisation)
         self.forgetting = forgetting
         self.maximum_trace = maximum_trace
         self.weights = np.zeros((hidden, POSE_SIZE))
@@ -202,9 +197,7 @@ class ExtremeLearningMachine:
         ValueError
             If the number of gratings is wrong or a shift is not finite; the message names the gratings.
         """
-        shift = np.asarray(shift, dtype=float)
-        if shift.ndim == 0 or shift.shape[-1] != self.centres.shape[1]:
-            raise ValueError(f"shift must end in {self.centres.shape[1]} gratings, got shape {shift.shape}")
+        shift = numbers("shift", shift, (..., self.centres.shape[1]))
         if not np.isfinite(shift).all():
             broken = np.unique(np.nonzero(~np.isfinite(shift))[-1])
             raise ValueError(
@@ -227,12 +220,8 @@ class ExtremeLearningMachine:
         ValueError
             If the samples do not match or are not finite.
         """
-        poses = np.asarray(poses, dtype=float)
-        hidden = self.hidden_output(shifts)
-        if hidden.ndim != 2 or poses.shape != (len(hidden), POSE_SIZE) or not len(poses):
-            raise ValueError(f"expected poses ({len(hidden)}, {POSE_SIZE}), got {poses.shape}")
-        if not np.isfinite(poses).all():
-            raise ValueError(f"pose of sample {np.argwhere(~np.isfinite(poses))[0, 0]} is not finite")
+        hidden = self.hidden_output(numbers("shifts", shifts, ("n", self.centres.shape[1])))
+        poses = finite("poses", poses, (len(hidden), POSE_SIZE))
         labels = same_hemisphere(poses, poses[0])
         normal = hidden.T @ hidden + self.regularisation * np.eye(hidden.shape[1])
         try:
@@ -277,9 +266,7 @@ class ExtremeLearningMachine:
             Errors before and after learning; a label that is not finite, or a covariance that lost its
             positive definiteness, is refused and leaves the network as it was.
         """
-        label = np.asarray(pose, dtype=float)
-        if label.shape != (POSE_SIZE,):
-            raise ValueError(f"pose must be ({POSE_SIZE},), got {label.shape}")
+        label = numbers("pose", pose, (POSE_SIZE,))
         hidden = self.hidden_output(shift)
         raw = hidden @ self.weights
         direction = dsymv(1.0, self._covariance, hidden, lower=1)

@@ -9,6 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import finite, number, positive
+
 Array = NDArray[np.float64]
 
 
@@ -52,14 +54,10 @@ class RollingGaussianProcess:
         noise: float,
         batch: tuple[int, ...] = (),
     ) -> None:
-        scales = np.asarray(length_scales, dtype=float)
-        if window < 1 or outputs < 1:
-            raise ValueError(f"window and outputs must be at least 1, got {window} and {outputs}")
-        if scales.ndim != 1 or not (np.isfinite(scales) & (scales > 0.0)).all():
-            raise ValueError(f"length_scales must be finite and above 0, got {scales}")
-        if not 0.0 < noise < np.inf:
-            raise ValueError(f"noise must be finite and above 0, got {noise}")
-        self.window, self.length_scales, self.noise = window, scales, noise
+        number("window", window, at_least=1)
+        number("outputs", outputs, at_least=1)
+        scales = finite("length_scales", length_scales, ("n",), above=0)
+        self.window, self.length_scales, self.noise = window, scales, positive("noise", noise)
         self.count = 0
         self._inputs = np.zeros((*batch, window, len(scales)))
         self._outputs = np.zeros((*batch, window, outputs))
@@ -82,9 +80,8 @@ class RollingGaussianProcess:
         ValueError
             If a value is not finite.
         """
-        inputs, outputs = np.asarray(inputs, dtype=float), np.asarray(outputs, dtype=float)
-        if not (np.isfinite(inputs).all() and np.isfinite(outputs).all()):
-            raise ValueError(f"sample {self.count} is not finite: inputs {inputs}, outputs {outputs}")
+        inputs = finite(f"inputs of sample {self.count}", inputs)
+        outputs = finite(f"outputs of sample {self.count}", outputs)
         slot = self.count % self.window
         self._inputs[..., slot, :] = inputs / self.length_scales
         self._outputs[..., slot, :] = outputs

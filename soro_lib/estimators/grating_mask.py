@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import finite, number, numbers, positive
+
 Array = NDArray[np.float64]
 
 REFRESH = 10
@@ -51,14 +53,10 @@ class GratingMask:
     def __init__(
         self, shifts: ArrayLike, *, noise: float, gate: float = 5.0, most: int | None = None
     ) -> None:
-        shifts = np.asarray(shifts, dtype=float)
-        if shifts.ndim != 2 or len(shifts) < 2 or not np.isfinite(shifts).all():
-            raise ValueError(f"shifts must be a finite (n >= 2, l) table, got shape {shifts.shape}")
-        if not (noise > 0.0 and gate > 0.0):
-            raise ValueError(f"noise and gate must be above 0, got {noise} and {gate}")
-        self.gate = gate
+        shifts = finite("shifts", shifts, ("n >= 2", "l"))
+        self.gate = number("gate", gate, above=0, at_most=np.inf)
         self.most = shifts.shape[1] // 3 if most is None else most
-        self._scale = noise
+        self._scale = positive("noise", noise)
         self._mean = shifts.mean(axis=0)
         self._count = len(shifts)
         deviations = (shifts - self._mean) / noise
@@ -94,9 +92,7 @@ class GratingMask:
         ValueError
             If the number of gratings is wrong.
         """
-        shift = np.asarray(shift, dtype=float)
-        if shift.shape != self._mean.shape:
-            raise ValueError(f"shift must have shape {self._mean.shape}, got {shift.shape}")
+        shift = numbers("shift", shift, self._mean.shape)
         masked = ~np.isfinite(shift)
         deviation = np.where(masked, 0.0, (shift - self._mean) / self._scale)
         precision = self._precision

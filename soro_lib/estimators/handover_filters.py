@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from soro_lib.checks import check_fields
 from soro_lib.poses import magnitude
 from soro_lib.sensing.handover_observation import HandoverObservation
 
@@ -38,14 +39,10 @@ class FilterNoise:
     move_deviation: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("process", "initial"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        if self.measurement is not None and not self.measurement > 0:
-            raise ValueError(f"measurement must be positive, got {self.measurement}")
-        for name in ("expected_move", "move_deviation"):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"{name} must be at least 0, got {getattr(self, name)}")
+        check_fields(self, "process", "initial", above=0)
+        if self.measurement is not None:
+            check_fields(self, "measurement", above=0)
+        check_fields(self, "expected_move", "move_deviation", at_least=0)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields, finite, positive
+
 Array = NDArray[np.float64]
 
 MEASURED: Array = np.kron(np.eye(3), np.eye(2, 3)).astype(np.float64)
@@ -51,10 +53,8 @@ class PalmFilterSettings:
     window: int = 20
 
     def __post_init__(self) -> None:
-        for name in ("acceleration_density", "position_sd", "velocity_sd", "initial_variance", "window"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"PalmFilterSettings.{name} = {value}, must be finite and > 0")
+        check_fields(self, "acceleration_density", "position_sd", "velocity_sd", above=0)
+        check_fields(self, "initial_variance", "window", above=0)
 
 
 PAPER_SETTINGS = PalmFilterSettings(position_sd=math.sqrt(0.7) * 1e-3, velocity_sd=math.sqrt(0.7) * 1e-3)
@@ -152,9 +152,7 @@ class PalmFilter:
         ValueError
             If the measurement is not finite or time does not increase.
         """
-        position = np.asarray(position, dtype=float)
-        if position.shape != (3,) or not all(map(math.isfinite, position.tolist())):
-            raise ValueError(f"PalmFilter.update: position = {position}, must be 3 finite numbers")
+        position = finite("PalmFilter.update: position", position, (3,))
         if self.time is None:
             self._begin(position)
             self.time = time
@@ -380,9 +378,7 @@ class DirectionFilter:
     """
 
     def __init__(self, time_constant: float = 0.1, range_ratio: float = 2.0) -> None:
-        if not (math.isfinite(time_constant) and time_constant > 0):
-            raise ValueError(f"DirectionFilter.time_constant = {time_constant}, must be finite and > 0")
-        self.time_constant = time_constant
+        self.time_constant = positive("DirectionFilter.time_constant", time_constant)
         self.range_ratio = range_ratio
         self.reset((0.0, 0.0, 1.0))
 

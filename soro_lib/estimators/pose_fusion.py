@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import number, numbers, positive
 from soro_lib.estimators.extreme_learning_machine import same_hemisphere, unit_quaternion
 
 Array = NDArray[np.float64]
@@ -31,8 +32,7 @@ def fibre_weight(reprojection_error: ArrayLike, lower: float, upper: float) -> A
     ValueError
         If the bounds are not increasing.
     """
-    if not 0.0 <= lower < upper < np.inf:
-        raise ValueError(f"bounds must be 0 <= lower < upper, got lower={lower}, upper={upper}")
+    number("lower", lower, at_least=0, below=number("upper", upper))
     error = np.asarray(reprojection_error, dtype=float)
     error = np.where(np.isnan(error), np.inf, error)
     return np.clip((error - lower) / (upper - lower), 0.0, 1.0)
@@ -70,10 +70,8 @@ def blend_poses(camera_pose: ArrayLike, fibre_pose: ArrayLike, weight: ArrayLike
     ValueError
         If a shape is wrong, or neither pose is finite.
     """
-    camera, fibre = np.asarray(camera_pose, dtype=float), np.asarray(fibre_pose, dtype=float)
-    for name, pose in (("camera_pose", camera), ("fibre_pose", fibre)):
-        if pose.ndim == 0 or pose.shape[-1] != 7:
-            raise ValueError(f"{name} must be (..., 7), got {pose.shape}")
+    camera = numbers("camera_pose", camera_pose, (..., 7))
+    fibre = numbers("fibre_pose", fibre_pose, (..., 7))
     has_camera, has_fibre = np.isfinite(camera).all(axis=-1), np.isfinite(fibre).all(axis=-1)
     if not (has_camera & has_fibre).all():
         if not (has_camera | has_fibre).all():
@@ -147,9 +145,10 @@ class InverseVarianceFusion:
     def __init__(
         self, period: float = 0.05, acceleration: float = 0.05, gate: float = 16.3, reacquire: int = 20
     ) -> None:
-        if not (period > 0.0 and acceleration > 0.0 and gate > 0.0 and reacquire > 0):
-            raise ValueError("period, acceleration, gate and reacquire must be above 0")
-        self.gate, self.reacquire = gate, reacquire
+        positive("period", period)
+        positive("acceleration", acceleration)
+        self.gate = number("gate", gate, above=0, at_most=np.inf)
+        self.reacquire = number("reacquire", reacquire, above=0, at_most=np.inf)
         self._transition = np.array([[1.0, period], [0.0, 1.0]])
         effect = np.array([0.5 * period**2, period])
         self._process = acceleration**2 * np.outer(effect, effect)

@@ -12,11 +12,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import positive
 from soro_lib.poses import magnitude
 from soro_lib.robots.helix_kernels import (
     cholesky,
     cholesky_solve,
     dot,
+    kernel_vector,
     largest,
     multiply,
     outer_gram,
@@ -129,23 +131,9 @@ def checked_arguments(
     q_sys: ArrayLike, measured_points: ArrayLike, bound: float, weights: ArrayLike
 ) -> tuple[Array, Array, Array]:
     """Return the three arrays as contiguous floats, or raise ValueError naming the one that is wrong."""
-    arrays = []
-    for name, values, size in (
-        ("q_sys", q_sys, 9),
-        ("measured_points", measured_points, 6),
-        ("weights", weights, 9),
-    ):
-        array = np.ascontiguousarray(values, dtype=float)
-        if array.shape != (size,):
-            raise ValueError(f"{name} must have shape ({size},), got {array.shape}")
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} must be finite, got {array}")
-        arrays.append(array)
-    if not (arrays[2] > 0).all():
-        raise ValueError(f"weights must be positive, got {arrays[2]}")
-    if not (np.isfinite(bound) and bound > 0):
-        raise ValueError(f"bound must be positive and finite, got {bound}")
-    return arrays[0], arrays[1], arrays[2]
+    positive("bound", bound)
+    commanded, points = kernel_vector("q_sys", q_sys, 9), kernel_vector("measured_points", measured_points, 6)
+    return commanded, points, kernel_vector("weights", weights, 9, above=0)
 
 
 @njit(cache=True)

@@ -1,10 +1,12 @@
 """The online estimator: learn the fibre from the camera, then fuse the two (Wang et al., Sec. II)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields, numbers
 from soro_lib.estimators.extreme_learning_machine import POSE_SIZE, ExtremeLearningMachine
 from soro_lib.estimators.grating_mask import GratingMask
 from soro_lib.estimators.pose_fusion import fuse_poses, inlier_weighted_error
@@ -42,13 +44,10 @@ class VisualStrainSettings:
 
     def __post_init__(self) -> None:
         """Check the values; the error names the field and its bound."""
-        if self.initial_samples < 1:
-            raise ValueError(f"initial_samples must be at least 1, got {self.initial_samples}")
-        for name in ("update_threshold", "nominal_inliers", "grating_noise", "agreement"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise ValueError(f"{name} must be finite and not negative, got {getattr(self, name)}")
-        if not 0.0 <= self.lower < self.upper < np.inf:
-            raise ValueError(f"lower must be below upper, got {self.lower} and {self.upper}")
+        check_fields(self, "initial_samples", at_least=1)
+        check_fields(self, "update_threshold", "nominal_inliers", "grating_noise", "agreement", at_least=0)
+        check_fields(self, "upper")
+        check_fields(self, "lower", at_least=0, below=self.upper)
 
 
 @dataclass(frozen=True)
@@ -80,11 +79,11 @@ class PoseEstimate:
     pose: Array
     camera_pose: Array
     fibre_pose: Array
-    fibre_variance: float
-    posterior_error: float
-    error: float
-    learned: bool
-    masked: int
+    fibre_variance: float = np.inf
+    posterior_error: float = np.nan
+    error: float = np.inf
+    learned: bool = False
+    masked: int = 0
     note: str = ""
 
 
@@ -114,7 +113,7 @@ class VisualStrainEstimator:
         self._time = -np.inf
         self._camera_pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         self._fibre_pose = np.full(POSE_SIZE, np.nan)
-        self._last: PoseEstimate | None = None
+        self._fused_pose = self._camera_pose
 
     def update(
         self,
@@ -148,11 +147,9 @@ class VisualStrainEstimator:
         ValueError
             If a shape is wrong.
         """
-        shift = np.asarray(shift, dtype=float)
-        if shift.shape != (self.network.centres.shape[1],):
-            raise ValueError(f"shift must be ({self.network.centres.shape[1]},), got {shift.shape}")
+        shift = numbers("shift", shift, (self.network.centres.shape[1],))
         if not time > self._time:
-            return self._repeat(f"time stamp {time} does not follow {self._time}")
+            return self._estimate(self._fused_pose, note=f"time stamp {time} does not follow {self._time}")
         self._time = time
         error = self._watch_camera(camera_pose, reprojection_error, inliers)
         shift, masked, whole = self._watch_fibre(shift, error)
@@ -170,19 +167,13 @@ class VisualStrainEstimator:
         pose = fuse_poses(
             self._camera_pose, self._fibre_pose, error, lower=self.settings.lower, upper=self.settings.upper
         )
-        return self._remember(
-            PoseEstimate(
-                pose, self._camera_pose, self._fibre_pose, variance, posterior, error, learnable, masked, note
-            )
-        )
+        return self._estimate(pose, variance, posterior, error, learnable, masked, note)
 
     def _watch_camera(self, pose: ArrayLike | None, reprojection_error: float, inliers: float) -> float:
         """Keep the latest valid camera pose; return the error the fusion shall act on."""
         if pose is None:
             return np.inf
-        pose = np.asarray(pose, dtype=float)
-        if pose.shape != (POSE_SIZE,):
-            raise ValueError(f"camera_pose must be ({POSE_SIZE},), got {pose.shape}")
+        pose = numbers("camera_pose", pose, (POSE_SIZE,))
         if not np.isfinite(pose).all() or not np.isfinite(reprojection_error) or pose[3:] @ pose[3:] < 1e-12:
             return np.inf
         self._camera_pose = np.concatenate([pose[:3], pose[3:] / np.sqrt(pose[3:] @ pose[3:])])
@@ -212,32 +203,9 @@ class VisualStrainEstimator:
             self.network.fit(self._shifts, self._labels)
             if self.settings.grating_noise > 0.0:
                 self._mask = GratingMask(self._shifts, noise=self.settings.grating_noise)
-        return self._remember(
-            PoseEstimate(
-                pose=self._camera_pose,
-                camera_pose=self._camera_pose,
-                fibre_pose=self._fibre_pose,
-                fibre_variance=np.inf,
-                posterior_error=np.nan,
-                error=error,
-                learned=learnable,
-                masked=masked,
-            )
-        )
+        return self._estimate(self._camera_pose, error=error, learned=learnable, masked=masked)
 
-    def _remember(self, estimate: PoseEstimate) -> PoseEstimate:
-        self._last = estimate
-        return estimate
-
-    def _repeat(self, note: str) -> PoseEstimate:
-        return PoseEstimate(
-            pose=self._camera_pose if self._last is None else self._last.pose,
-            camera_pose=self._camera_pose,
-            fibre_pose=self._fibre_pose,
-            fibre_variance=np.inf,
-            posterior_error=np.nan,
-            error=np.inf,
-            learned=False,
-            masked=0,
-            note=note,
-        )
+    def _estimate(self, pose: Array, *known: Any, **more: Any) -> PoseEstimate:
+        """Return the estimate with this fused pose and the sensors' latest, and remember the pose."""
+        self._fused_pose = pose
+        return PoseEstimate(pose, self._camera_pose, self._fibre_pose, *known, **more)

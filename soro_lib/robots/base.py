@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.arcs import backbone, chain_jacobian, chain_transform
+from soro_lib.checks import finite, numbers
 
 FloatArray = NDArray[np.float64]
 
@@ -115,92 +116,40 @@ class Robot(Protocol):
         return backbone(self.configuration(actuation), points_per_segment)
 
     def check(self, actuation: ArrayLike) -> FloatArray:
-        """Return the actuation as an array, shape (..., n), or raise :class:`ActuationError`."""
-        return check_actuation(actuation, self.lower, self.upper, self.actuator_names)
+        """Return the actuation as an array, shape (..., n), if it lies within the limits.
+
+        Both limits are admissible; rounding may exceed them by `LIMIT_TOLERANCE` of the range.
+
+        Raises
+        ------
+        ActuationError
+            Naming the actuator, its index, the value and the bound.
+        """
+        lower, upper, names = self.lower, self.upper, self.actuator_names
+        array = numbers("actuation", actuation, (..., len(names)), ActuationError)
+        slack = LIMIT_TOLERANCE * (upper - lower)
+        within = (array >= lower - slack) & (array <= upper + slack)
+        if not within.all():
+            index = tuple(np.argwhere(~within)[0])
+            actuator = int(index[-1])
+            raise ActuationError(
+                f"actuation[{actuator}] ({names[actuator]}) is {array[index]:.6g}, "
+                f"outside [{lower[actuator]:.6g}, {upper[actuator]:.6g}]"
+            )
+        return array
 
     def clip(self, actuation: ArrayLike) -> ClippedActuation:
-        """Return the nearest admissible actuation and the report of what was changed."""
-        return clip_actuation(actuation, self.lower, self.upper, self.actuator_names)
+        """Return the nearest admissible actuation, actuator by actuator, and the report of what was changed.
 
-
-def check_actuation(
-    actuation: ArrayLike, lower: FloatArray, upper: FloatArray, names: tuple[str, ...]
-) -> FloatArray:
-    """Return the actuation as an array if it lies within the limits.
-
-    Parameters
-    ----------
-    actuation : array_like, shape (..., n)
-        Commands, one per actuator.
-    lower, upper : ndarray, shape (n,)
-        Limits, both admissible; rounding may exceed them by `LIMIT_TOLERANCE` of the range.
-    names : tuple of str
-        What the actuators are called in the error, with unit.
-
-    Raises
-    ------
-    ActuationError
-        Naming the actuator, its index, the value and the bound.
-    """
-    array = _as_actuation(actuation, names)
-    slack = LIMIT_TOLERANCE * (upper - lower)
-    within = (array >= lower - slack) & (array <= upper + slack)
-    if not within.all():
-        index = tuple(np.argwhere(~within)[0])
-        actuator = int(index[-1])
-        raise ActuationError(
-            f"actuation[{actuator}] ({names[actuator]}) is {array[index]:.6g}, "
-            f"outside [{lower[actuator]:.6g}, {upper[actuator]:.6g}]"
-        )
-    return array
-
-
-def clip_actuation(
-    actuation: ArrayLike, lower: FloatArray, upper: FloatArray, names: tuple[str, ...]
-) -> ClippedActuation:
-    """Move an actuation into the limits, actuator by actuator, and report what was changed.
-
-    Raises
-    ------
-    ActuationError
-        If the actuation is malformed or not finite: there is no nearest value then.
-    """
-    array = finite_actuation(actuation, names)
-    return report_clipping(array, np.clip(array, lower, upper))
-
-
-def finite_actuation(actuation: ArrayLike, names: tuple[str, ...]) -> FloatArray:
-    """Return the actuation as an array, shape (..., n), or raise `ActuationError` where it is not finite."""
-    return require_finite(_as_actuation(actuation, names), "actuation")
+        Raises
+        ------
+        ActuationError
+            If the actuation is malformed or not finite: there is no nearest value then.
+        """
+        requested = finite("actuation", actuation, (..., len(self.actuator_names)), ActuationError)
+        return report_clipping(requested, np.clip(requested, self.lower, self.upper))
 
 
 def report_clipping(requested: FloatArray, admissible: FloatArray) -> ClippedActuation:
     """Return the admissible actuation and the report of how it differs from the requested one."""
     return ClippedActuation(admissible, admissible != requested, requested - admissible)
-
-
-def require_finite(array: FloatArray, name: str) -> FloatArray:
-    """Return the array, or raise :class:`ActuationError` naming its first value that is not finite."""
-    if not np.isfinite(array).all():
-        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ActuationError(f"{name} must be finite, got {array[index]} at index {index}")
-    return array
-
-
-def require_positive(**values: float) -> None:
-    """Raise ValueError naming the first parameter that is not a finite positive number."""
-    for name, value in values.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} must be finite and positive, got {value!r}")
-
-
-def _as_actuation(actuation: ArrayLike, names: tuple[str, ...]) -> FloatArray:
-    try:
-        array = np.asarray(actuation, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ActuationError(f"actuation must be numbers of shape (..., {len(names)}): {error}") from None
-    if array.ndim == 0 or array.shape[-1] != len(names):
-        raise ActuationError(
-            f"actuation must have shape (..., {len(names)}) of ({', '.join(names)}), got {array.shape}"
-        )
-    return array

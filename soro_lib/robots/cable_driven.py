@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from soro_lib.arcs import chain_jacobian, chain_transform
-from soro_lib.robots.base import FloatArray, Robot, require_positive
+from soro_lib.checks import check_fields, one_of
+from soro_lib.robots.base import FloatArray, Robot
 
 CABLE_ANGLES = 2.0 * np.pi / 3.0 * np.arange(3)
 """Directions of the three cables of a segment about z [rad]."""
@@ -74,22 +75,11 @@ class CableDrivenArm(Robot):
     )
 
     def __post_init__(self) -> None:
-        require_positive(
-            young_modulus=self.young_modulus,
-            outer_radius=self.outer_radius,
-            cable_radius=self.cable_radius,
-            segment_length=self.segment_length,
-            slide_length=self.slide_length,
-            maximum_tension=self.maximum_tension,
-        )
-        if not 0.0 <= self.inner_radius < self.outer_radius:
-            raise ValueError(
-                f"inner_radius must be in [0, outer_radius = {self.outer_radius}), got {self.inner_radius!r}"
-            )
-        if self.coupling_sign not in (-1, 1):
-            raise ValueError(f"coupling_sign must be -1 or +1, got {self.coupling_sign!r}")
-        if not (np.isfinite(self.cap_length) and self.cap_length >= 0.0):
-            raise ValueError(f"cap_length must be finite and at least 0, got {self.cap_length!r}")
+        sizes = ("young_modulus", "outer_radius", "cable_radius", "segment_length", "slide_length")
+        check_fields(self, *sizes, "maximum_tension", above=0)
+        check_fields(self, "inner_radius", at_least=0, below=self.outer_radius)
+        check_fields(self, "cap_length", at_least=0)
+        one_of("CableDrivenArm.coupling_sign", self.coupling_sign, (-1, 1))
         compression = 6.0 * self.maximum_tension / self.axial_stiffness
         if compression >= self.segment_length:
             raise ValueError(
@@ -160,7 +150,7 @@ class CableDrivenArm(Robot):
         """Return d configuration / d actuation, shape (..., 9 or 15, 7)."""
         forces, moments = self._loads(self.check(actuation))
         lengths = self.segment_length - forces / self.axial_stiffness
-        force_slope, moment_slope = self._load_slopes
+        force_slope, moment_slope = self.load_slopes
         length_slope = -force_slope / self.axial_stiffness
         soft = np.zeros((*forces.shape, 3, 7))
         soft[..., :2, :] = (
@@ -175,11 +165,7 @@ class CableDrivenArm(Robot):
 
     def mid_point(self, actuation: ArrayLike) -> FloatArray:
         """Return the end of the proximal segment and its cap [m], shape (..., 3): frame {M} of the paper."""
-        return self.mid_pose(actuation)[..., :3, 3]
-
-    def mid_pose(self, actuation: ArrayLike) -> FloatArray:
-        """Return the pose of frame {M} in the base frame, shape (..., 4, 4)."""
-        return chain_transform(self.configuration(actuation)[..., : self._mid_pieces, :])
+        return chain_transform(self.configuration(actuation)[..., : self._mid_pieces, :])[..., :3, 3]
 
     def mid_jacobian(self, actuation: ArrayLike) -> FloatArray:
         """Return the Jacobian of {M}, shape (..., 6, 7): the linear rows are J_M of Lai et al., Eq. (27)."""
@@ -188,8 +174,11 @@ class CableDrivenArm(Robot):
         return chain_jacobian(pieces) @ self.configuration_jacobian(actuation)[..., : 3 * count, :]
 
     @cached_property
-    def _load_slopes(self) -> tuple[FloatArray, FloatArray]:
-        """Axial forces (2, 7) and moment vectors (2, 2, 7) per unit of actuation; rows: proximal, distal."""
+    def load_slopes(self) -> tuple[FloatArray, FloatArray]:
+        """Axial forces (2, 7) and moment vectors (2, 2, 7) per unit of actuation; rows: proximal, distal.
+
+        The sums in Lai et al., Eqs. (1)-(3); the compiled kinematics take them from here.
+        """
         tension = -np.eye(7)[1:].reshape(2, 3, 7)
         directions = self.cable_radius * np.stack([np.cos(CABLE_ANGLES), np.sin(CABLE_ANGLES)])
         own_force, own_moment = tension.sum(axis=1), directions @ tension
@@ -199,7 +188,7 @@ class CableDrivenArm(Robot):
 
     def _loads(self, actuation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return axial forces (..., 2) [N] and moment vectors (..., 2, 2) [N m] of the two segments."""
-        force_slope, moment_slope = self._load_slopes
+        force_slope, moment_slope = self.load_slopes
         return actuation @ force_slope.T, np.tensordot(actuation, moment_slope, axes=(-1, -1))
 
     @property

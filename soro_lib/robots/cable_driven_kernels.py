@@ -12,8 +12,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from soro_lib.arc_kernels import chain_frame_and_jacobian, swing
+from soro_lib.arcs import chain_jacobian, chain_transform
 from soro_lib.robots.base import Robot
-from soro_lib.robots.cable_driven import CABLE_ANGLES, CableDrivenArm
+from soro_lib.robots.cable_driven import CableDrivenArm
 
 Array = NDArray[np.float64]
 
@@ -48,13 +49,12 @@ def compiled_kinematics(arm: CableDrivenArm) -> Callable[[Array], Kinematics]:
     arm : CableDrivenArm
         Its parameters are frozen into the result.
     """
-    parameters = np.array(
-        [arm.segment_length, arm.cable_radius, arm.axial_stiffness, arm.bending_rigidity,
-         float(arm.coupling_sign), arm.cap_length]
-    )  # fmt: skip
+    force_slope, moment_slope = arm.load_slopes
+    load_slopes = np.concatenate([force_slope[:, np.newaxis], moment_slope], axis=1)
+    parameters = np.array([arm.segment_length, arm.axial_stiffness, arm.bending_rigidity, arm.cap_length])
 
     def kinematics(actuation: Array) -> Kinematics:
-        return Kinematics(*_kinematics(actuation, parameters))
+        return Kinematics(*_kinematics(actuation, load_slopes, parameters))
 
     return kinematics
 
@@ -64,7 +64,6 @@ def generic_kinematics(robot: Robot) -> Callable[[Array], Kinematics]:
 
     {M} is the middle of the chain of pieces. Slower than the compiled form, same result.
     """
-    from soro_lib.arcs import chain_jacobian, chain_transform
 
     def kinematics(actuation: Array) -> Kinematics:
         pieces, slope = robot.configuration(actuation), robot.configuration_jacobian(actuation)
@@ -79,14 +78,13 @@ def generic_kinematics(robot: Robot) -> Callable[[Array], Kinematics]:
     return kinematics
 
 
-_COS, _SIN = np.cos(CABLE_ANGLES), np.sin(CABLE_ANGLES)
-
-
 @njit(cache=True)
-def _kinematics(q: Array, parameters: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+def _kinematics(
+    q: Array, load_slopes: Array, parameters: Array
+) -> tuple[Array, Array, Array, Array, Array, Array]:
     """Return tip, mid and direction (3,) and their Jacobians (3, 7)."""
-    _, _, _, _, _, cap = parameters
-    soft, soft_slope = _soft_segments(q, parameters)
+    cap = parameters[3]
+    soft, soft_slope = _soft_segments(q, load_slopes, parameters)
     step = 2 if cap > 0 else 1  # a cap is a straight piece after each soft one
     pieces = np.zeros((2 * step, 3))
     for k in range(3):
@@ -124,35 +122,27 @@ def _kinematics(q: Array, parameters: Array) -> tuple[Array, Array, Array, Array
 
 
 @njit(cache=True)
-def _soft_segments(q: Array, parameters: Array) -> tuple[Array, Array]:
+def _soft_segments(q: Array, load_slopes: Array, parameters: Array) -> tuple[Array, Array]:
     """Return the soft segments (2, 3) as (dx, dy, length) and their slope (6, 7) by the actuation.
 
-    Lai et al., Eqs. (1)-(3) as one vector equation, as in `CableDrivenArm.segments`.
+    What `CableDrivenArm.segments` does with `CableDrivenArm.load_slopes`; here force and moments of a segment
+    are the rows of ``load_slopes`` (2, 3, 7).
     """
-    length, radius, stiffness, rigidity, coupling, _ = parameters
-    force, force_slope = np.zeros(2), np.zeros((2, 7))
-    moment, moment_slope = np.zeros((2, 2)), np.zeros((2, 2, 7))
-    for k in range(2):
-        for i in range(3):
-            column = 1 + 3 * k + i
-            for segment in range(k + 1):
-                share = coupling if segment < k else 1.0
-                force_slope[segment, column] = -1.0
-                moment_slope[segment, 0, column] = -share * radius * _COS[i]
-                moment_slope[segment, 1, column] = -share * radius * _SIN[i]
-                force[segment] += force_slope[segment, column] * q[column]
-                for axis in range(2):
-                    moment[segment, axis] += moment_slope[segment, axis, column] * q[column]
+    length, stiffness, rigidity, _ = parameters
     soft, slope = np.empty((2, 3)), np.empty((6, 7))
     for k in range(2):
-        soft[k, 2] = length - force[k] / stiffness
+        load = np.zeros(3)
+        for column in range(1, 7):
+            for row in range(3):
+                load[row] += load_slopes[k, row, column] * q[column]
+        soft[k, 2] = length - load[0] / stiffness
+        for axis in range(2):
+            soft[k, axis] = load[1 + axis] * soft[k, 2] / rigidity
         for column in range(7):
-            stretch_slope = -force_slope[k, column] / stiffness
+            stretch_slope = -load_slopes[k, 0, column] / stiffness
             slope[3 * k + 2, column] = stretch_slope
             for axis in range(2):
                 slope[3 * k + axis, column] = (
-                    moment_slope[k, axis, column] * soft[k, 2] + moment[k, axis] * stretch_slope
+                    load_slopes[k, 1 + axis, column] * soft[k, 2] + load[1 + axis] * stretch_slope
                 ) / rigidity
-        for axis in range(2):
-            soft[k, axis] = moment[k, axis] * soft[k, 2] / rigidity
     return soft, slope

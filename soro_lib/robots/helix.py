@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from soro_lib.arcs import chain_transform, chain_transform_and_jacobian, routing_matrix
+from soro_lib.checks import check_fields, finite, number
 from soro_lib.robots.base import (
     LIMIT_TOLERANCE,
     ActuationError,
@@ -20,11 +21,7 @@ from soro_lib.robots.base import (
     ClippedActuation,
     FloatArray,
     Robot,
-    check_actuation,
-    finite_actuation,
     report_clipping,
-    require_finite,
-    require_positive,
 )
 
 TENDON_ANGLES = 2.0 * np.pi / 3.0 * np.arange(3)
@@ -94,24 +91,12 @@ class HelixArm(Robot):
     )
 
     def __post_init__(self) -> None:
-        require_positive(
-            tendon_radius=self.tendon_radius,
-            pulley_radius=self.pulley_radius,
-            gripper_length=self.gripper_length,
-        )
-        triples = ("rest_lengths", "maximum_bends", "minimum_lengths", "maximum_lengths", "tendon_offsets")
-        for name in triples:
-            values = np.asarray(getattr(self, name), dtype=float)
-            if values.shape != (3,) or not np.isfinite(values).all():
-                raise ValueError(f"{name} must be three finite numbers, got {getattr(self, name)!r}")
-        for i in range(3):
-            require_positive(**{f"maximum_bends[{i}]": self.maximum_bends[i]})
-            require_positive(**{f"minimum_lengths[{i}]": self.minimum_lengths[i]})
-            if not self.minimum_lengths[i] <= self.rest_lengths[i] <= self.maximum_lengths[i]:
-                raise ValueError(
-                    f"rest_lengths[{i}] must be in [{self.minimum_lengths[i]}, {self.maximum_lengths[i]}], "
-                    f"got {self.rest_lengths[i]!r}"
-                )
+        check_fields(self, "tendon_radius", "pulley_radius", "gripper_length", above=0)
+        check_fields(self, "maximum_bends", "minimum_lengths", shape=(3,), above=0)
+        check_fields(self, "rest_lengths", "maximum_lengths", "tendon_offsets", shape=(3,))
+        bounds = zip(self.minimum_lengths, self.rest_lengths, self.maximum_lengths)
+        for i, (low, rest, high) in enumerate(bounds):
+            number(f"HelixArm.rest_lengths[{i}]", rest, at_least=low, at_most=high)
         if len(self.motor_orientations) != 9 or not set(self.motor_orientations) <= {-1, 1}:
             raise ValueError(f"motor_orientations must be nine of -1 and +1, got {self.motor_orientations!r}")
 
@@ -143,7 +128,7 @@ class HelixArm(Robot):
         ActuationWarning
             If the bend hypot(dx, dy) of a segment exceeds its limit although dx and dy respect theirs.
         """
-        q = check_actuation(actuation, self.lower, self.upper, self.actuator_names)
+        q = super().check(actuation)
         bends = self.bends_and_lengths(q)[..., ::2]
         too_far = bends > np.asarray(self.maximum_bends) * (1.0 + LIMIT_TOLERANCE)
         if too_far.any():
@@ -159,7 +144,7 @@ class HelixArm(Robot):
 
     def clip(self, actuation: ArrayLike) -> ClippedActuation:
         """Return the nearest q within the limits, bends shrunk in their own plane, and the report."""
-        q = finite_actuation(actuation, self.actuator_names)
+        q = finite("actuation", actuation, (..., 9), ActuationError)
         bends = self.bends_and_lengths(q)[..., ::2]
         maximum = np.asarray(self.maximum_bends)
         shrink = np.divide(maximum, bends, out=np.ones_like(bends), where=bends > maximum)
@@ -220,13 +205,13 @@ class HelixArm(Robot):
 
     def motor_angles(self, lengths: ArrayLike) -> FloatArray:
         """Return the motor angles [rad] from calibration, shape (..., 9), of nine tendon lengths [m]."""
-        strands = require_finite(np.asarray(lengths, dtype=float), "lengths")
+        strands = finite("lengths", lengths, (..., 9), ActuationError)
         change = strands - self.tendon_lengths(self.home)
         return np.asarray(self.motor_orientations) * change / self.pulley_radius
 
     def tendons_from_motors(self, angles: ArrayLike) -> FloatArray:
         """Return the tendon lengths [m], shape (..., 9), of nine motor angles [rad] from calibration."""
-        turned = require_finite(np.asarray(angles, dtype=float), "angles")
+        turned = finite("angles", angles, (..., 9), ActuationError)
         return (
             self.tendon_lengths(self.home) + np.asarray(self.motor_orientations) * turned * self.pulley_radius
         )
@@ -248,10 +233,8 @@ class HelixArm(Robot):
 
     @staticmethod
     def _segments(values: ArrayLike, name: str = "q") -> FloatArray:
-        array = np.asarray(values, dtype=float)
-        if array.ndim == 0 or array.shape[-1] != 9:
-            raise ActuationError(f"{name} must have shape (..., 9), got {array.shape}")
-        return require_finite(array, name).reshape(*array.shape[:-1], 3, 3)
+        array = finite(name, values, (..., 9), ActuationError)
+        return array.reshape(*array.shape[:-1], 3, 3)
 
 
 def origin_from_arm_base(points: ArrayLike) -> FloatArray:

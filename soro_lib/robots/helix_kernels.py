@@ -8,9 +8,11 @@ Sums and products of arrays are plain loops: numba takes several times longer to
 and assignments to slices.
 """
 
+from typing import Unpack
+
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.arc_kernels import (
     arc_numbers,
@@ -24,10 +26,16 @@ from soro_lib.arc_kernels import (
     frame_velocities,
     swing,
 )
+from soro_lib.checks import Bounds, finite
 
 Array = NDArray[np.float64]
 
 SEGMENTS = 3
+
+
+def kernel_vector(name: str, value: ArrayLike, size: int, **bounds: Unpack[Bounds]) -> Array:
+    """Return finite numbers (size,) within bounds as every kernel takes them: contiguous, and a copy."""
+    return np.array(finite(name, value, (size,), **bounds))
 
 
 @njit(cache=True)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields, finite
 from soro_lib.robots.helix import HelixArm
 
 Array = NDArray[np.float64]
@@ -29,14 +30,10 @@ class TendonMotors:
     ticks_per_turn: int = 4096
 
     def __post_init__(self) -> None:
-        if (
-            len(self.shortest) != 9
-            or len(self.longest) != 9
-            or not np.all(np.less(self.shortest, self.longest))
-        ):
-            raise ValueError(f"shortest and longest must be nine pairs, got {self.shortest}, {self.longest}")
-        if self.ticks_per_turn < 1:
-            raise ValueError(f"ticks_per_turn must be at least 1, got {self.ticks_per_turn}")
+        check_fields(self, "shortest", "longest", shape=(9,))
+        if not np.less(self.shortest, self.longest).all():
+            raise ValueError(f"shortest must be below longest, got {self.shortest} and {self.longest}")
+        check_fields(self, "ticks_per_turn", at_least=1)
 
     def clip(self, tendon_change: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
         """Return the change (9,) [m] within the motors' range, and which tendons were cut short.
@@ -46,9 +43,7 @@ class TendonMotors:
         ValueError
             If a change is not finite.
         """
-        change = np.asarray(tendon_change, dtype=float)
-        if change.shape != (9,) or not np.isfinite(change).all():
-            raise ValueError(f"tendon_change must be nine finite numbers, got {tendon_change!r}")
+        change = finite("tendon_change", tendon_change, (9,))
         clipped = np.clip(change, self.shortest, self.longest)
         return clipped, clipped != change
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from soro_lib.arcs import routing_matrix
-from soro_lib.robots.base import FloatArray, Robot, require_finite, require_positive
+from soro_lib.checks import check_fields, finite
+from soro_lib.robots.base import ActuationError, FloatArray, Robot
 
 CHAMBER_ANGLES = np.pi / 2.0 + 2.0 * np.pi / 3.0 * np.arange(3)
 """Directions of the three chambers about z [rad]: 90, 210 and 330 degrees, as Eqs. (19)-(22) imply."""
@@ -58,18 +59,12 @@ class PneumaticArm(Robot):
     )
 
     def __post_init__(self) -> None:
-        require_positive(chamber_distance=self.chamber_distance, minimum_length=self.minimum_length)
-        if not self.minimum_length <= self.rest_length <= self.maximum_length < np.inf:
-            raise ValueError(
-                f"minimum_length <= rest_length <= maximum_length must hold, got {self.minimum_length!r}, "
-                f"{self.rest_length!r}, {self.maximum_length!r}"
-            )
-        if len(self.motor_gains) != 3 or not all(
-            np.isfinite(gain) and gain != 0 for gain in self.motor_gains
-        ):
-            raise ValueError(
-                f"motor_gains must be three finite numbers other than 0, got {self.motor_gains!r}"
-            )
+        check_fields(self, "chamber_distance", "minimum_length", above=0)
+        check_fields(self, "maximum_length", at_least=self.minimum_length)
+        check_fields(self, "rest_length", at_least=self.minimum_length, at_most=self.maximum_length)
+        check_fields(self, "motor_gains", shape=(3,))
+        if 0 in self.motor_gains:
+            raise ValueError(f"motor_gains must be other than 0, got {self.motor_gains!r}")
 
     @cached_property
     def lower(self) -> FloatArray:
@@ -111,11 +106,8 @@ class PneumaticArm(Robot):
 
     def chamber_lengths(self, configuration: ArrayLike) -> FloatArray:
         """Return the chamber lengths [m], shape (..., 3), of one arc, shape (..., 1, 3): the inverse map."""
-        arcs = np.asarray(configuration, dtype=float)
-        if arcs.shape[-2:] != (1, 3):
-            raise ValueError(f"configuration must have shape (..., 1, 3), got {arcs.shape}")
-        routing = routing_matrix(self.chamber_distance, CHAMBER_ANGLES)
-        lengths: FloatArray = require_finite(arcs[..., 0, :], "configuration") @ routing.T
+        arcs = finite("configuration", configuration, (..., 1, 3), ActuationError)
+        lengths: FloatArray = arcs[..., 0, :] @ routing_matrix(self.chamber_distance, CHAMBER_ANGLES).T
         return lengths
 
     def motor_commands(self, actuation: ArrayLike) -> FloatArray:

@@ -11,7 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from soro_lib.robots.base import ActuationError, FloatArray, Robot, require_finite
+from soro_lib.checks import check_fields, finite, number
+from soro_lib.robots.base import ActuationError, FloatArray, Robot
 
 MOTOR_ANGLES = np.array([-np.pi / 3.0, np.pi / 3.0, np.pi])
 """Directions in the plane that the three steering motors pull toward [rad] (supplement, Eq. (1))."""
@@ -54,16 +55,12 @@ class SoftGrowingArm(Robot):
     actuator_names: tuple[str, ...] = field(default=("x [m]", "y [m]", "z [m]"), init=False, repr=False)
 
     def __post_init__(self) -> None:
-        lower, upper = (np.asarray(v, dtype=float) for v in (self.lower_limit, self.upper_limit))
-        if (
-            lower.shape != (3,)
-            or upper.shape != (3,)
-            or not (np.isfinite([lower, upper]).all() and (lower < upper).all())
-        ):
+        check_fields(self, "lower_limit", "upper_limit", shape=(3,))
+        if not np.less(self.lower_limit, self.upper_limit).all():
             raise ValueError(
                 f"lower_limit must be below upper_limit, got {self.lower_limit} and {self.upper_limit}"
             )
-        if lower[2] <= 0.0:
+        if self.lower_limit[2] <= 0.0:
             raise ValueError(
                 f"lower_limit[2] (z) must be above 0, below the base, got {self.lower_limit[2]!r}"
             )
@@ -117,7 +114,7 @@ class SoftGrowingArm(Robot):
         Supplement, Eqs. (2)-(5); see `steering_coordinates` and `eversion_length`. Differences of points are
         accepted too, so the limits of the tip do not apply.
         """
-        position = _as_points(point, 3, "point")
+        position = finite("point", point, (..., 3), ActuationError)
         steering = steering_coordinates(position[..., :2])
         return np.concatenate([steering, eversion_length(position)[..., np.newaxis]], axis=-1)
 
@@ -129,17 +126,12 @@ class SoftGrowingArm(Robot):
         ActuationError
             If the eversion is shorter than the steering reaches out: no such point exists.
         """
-        values = _as_points(motors, 4, "motors")
+        values = finite("motors", motors, (..., 4), ActuationError)
         steered = values[..., :3] @ STEERING_FROM_MOTORS.T
         square = values[..., 3] ** 2 - (steered**2).sum(axis=-1)
         if (square < 0.0).any():
             raise ActuationError("motors: the eversion is shorter than the steering reaches out")
         return np.concatenate([steered, np.sqrt(square)[..., np.newaxis]], axis=-1)
-
-    @staticmethod
-    def redistribute_actuation(commands: ArrayLike, epsilon: float = REDISTRIBUTION) -> FloatArray:
-        """Return :func:`redistribute_actuation` of the commands."""
-        return redistribute_actuation(commands, epsilon)
 
 
 def steering_coordinates(point: ArrayLike) -> FloatArray:
@@ -149,7 +141,7 @@ def steering_coordinates(point: ArrayLike) -> FloatArray:
     All solutions of Eq. (1) differ by a common amount, and each sector's formula is the one whose smallest
     pull is zero; so one formula, less its minimum, serves all three sectors.
     """
-    x, y = np.moveaxis(_as_points(point, 2, "point"), -1, 0)
+    x, y = np.moveaxis(finite("point", point, (..., 2), ActuationError), -1, 0)
     pulls = np.stack([x - y / np.sqrt(3.0), x + y / np.sqrt(3.0), np.zeros_like(x)], axis=-1)
     return pulls - pulls.min(axis=-1, keepdims=True)
 
@@ -203,9 +195,8 @@ def redistribute_actuation(commands: ArrayLike, epsilon: float = REDISTRIBUTION)
     >>> redistribute_actuation([10.0, 0.0, 4.0])
     array([ 7., -3.,  1.])
     """
-    if not 0.0 <= epsilon <= 1.0:
-        raise ValueError(f"epsilon must be in [0, 1], got {epsilon!r}")
-    pulls = _as_points(commands, 3, "commands")
+    number("epsilon", epsilon, at_least=0, at_most=1)
+    pulls = finite("commands", commands, (..., 3), ActuationError)
     return pulls - epsilon * pulls.max(axis=-1, keepdims=True)
 
 
@@ -217,17 +208,11 @@ def redistribution_required(previous: ArrayLike, current: ArrayLike) -> bool:
     previous, current : array_like, shape (3,)
         Steering commands (s1, s2, s3) [m] from `steering_coordinates`.
     """
-    idle = (_as_points(previous, 3, "previous") == 0.0) & (_as_points(current, 3, "current") == 0.0)
-    return not idle.any()
+    before = finite("previous", previous, (..., 3), ActuationError)
+    after = finite("current", current, (..., 3), ActuationError)
+    return not ((before == 0.0) & (after == 0.0)).any()
 
 
 def _tilt_per_radius(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     radius = np.hypot(x, y)
     return np.divide(np.arctan2(radius, z), radius, out=np.asarray(1.0 / z), where=radius > 0.0)
-
-
-def _as_points(values: ArrayLike, size: int, name: str) -> FloatArray:
-    array = np.asarray(values, dtype=float)
-    if array.ndim == 0 or array.shape[-1] != size:
-        raise ValueError(f"{name} must have shape (..., {size}), got {array.shape}")
-    return require_finite(array, name)

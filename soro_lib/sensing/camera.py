@@ -12,6 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields, one_of
+
 NEAR = 1e-3
 """Distance of the near plane [m]: whatever is closer to the camera, or behind it, is cut off."""
 
@@ -47,11 +49,8 @@ class Camera:
     distortion: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("width", "height", "focal_length"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"Camera.{name} must be positive, got {getattr(self, name)}")
-        if len(self.distortion) not in (0, 4, 5):
-            raise ValueError(f"Camera.distortion must have 0, 4 or 5 entries, got {len(self.distortion)}")
+        check_fields(self, "width", "height", "focal_length", above=0)
+        one_of("number of coefficients in Camera.distortion", len(self.distortion), (0, 4, 5))
 
     @cached_property
     def matrix(self) -> NDArray[np.float64]:

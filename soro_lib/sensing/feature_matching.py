@@ -71,14 +71,9 @@ class FeatureDetector:
 
     def _check(self, image: object) -> None:
         size = (self.camera.height, self.camera.width)
-        if not isinstance(image, np.ndarray):
-            raise ValueError(
-                f"image must be uint8 of shape {size} or {(*size, 3)}, got {type(image).__name__}"
-            )
-        if image.dtype != np.uint8 or image.shape not in (size, (*size, 3)):
-            raise ValueError(
-                f"image must be uint8 of shape {size} or {(*size, 3)}, got {image.dtype} {image.shape}"
-            )
+        got = f"{image.dtype} {image.shape}" if isinstance(image, np.ndarray) else type(image).__name__
+        if got not in (f"uint8 {size}", f"uint8 {(*size, 3)}"):
+            raise ValueError(f"image must be uint8 of shape {size} or {(*size, 3)}, got {got}")
 
     def _spread_out(self, keypoints: Sequence[cv2.KeyPoint]) -> list[cv2.KeyPoint]:
         """Return the strongest keypoints of every cell, so that no corner of the image holds them all."""

@@ -264,10 +264,10 @@ def _playback_rows(frame: dict[str, Any]) -> list[dict[str, Any]]:
             "hand_type": hand.get("type"),
             "confidence": hand.get("confidence"),
         }
-        row |= dict(zip(PALM, hand["palmPosition"])) | dict(zip(NORMAL, hand["palmNormal"]))
-        row |= dict(zip(DIRECTION, hand.get("direction", ()))) | dict(
-            zip(VELOCITY, hand.get("palmVelocity", ()))
-        )
+        row |= zip(PALM, hand["palmPosition"])
+        row |= zip(NORMAL, hand["palmNormal"])
+        row |= zip(DIRECTION, hand.get("direction", ()))
+        row |= zip(VELOCITY, hand.get("palmVelocity", ()))
         row |= {"grab_strength": hand.get("grabStrength"), "pinch_strength": hand.get("pinchStrength")}
         fingers = [item for item in frame.get("pointables", ()) if item.get("handId") == hand["id"]]
         fingers = [item for item in fingers if not item.get("tool")]
@@ -302,7 +302,9 @@ def _checked(table: pd.DataFrame, name: str) -> pd.DataFrame:
     numeric = [c for c in (*TIME_COLUMNS, *HAND_COLUMNS, *OPTIONAL_COLUMNS, *VELOCITY) if c != "hand_type"]
     table = table.copy()
     for column in (column for column in numeric if column in table):
-        table[column] = _numeric(table[column], name)
+        number = pd.to_numeric(table[column], errors="coerce")
+        _require(number.notna() | table[column].isna(), table, column, name, "a number")
+        table[column] = number
 
     _require(np.isfinite(table["timestamp_us"]), table, "timestamp_us", name, "a finite time stamp")
     hand = table["hand_id"].notna()
@@ -328,24 +330,13 @@ def _checked(table: pd.DataFrame, name: str) -> pd.DataFrame:
     return table.astype({"timestamp_us": np.int64, "hand_id": "Int64"})
 
 
-def _numeric(column: pd.Series, name: str) -> pd.Series:
-    """Return the column as numbers, or name the first entry that is none."""
-    number = pd.to_numeric(column, errors="coerce")
-    wrong = number.isna() & column.notna()
-    if wrong.any():
-        row = int(np.argmax(wrong.to_numpy()))
-        raise RecordingError(
-            f"{name}: row {row + 1}, {column.name} = {column.iloc[row]!r}, expected a number"
-        )
-    return number
-
-
 def _require(good: Any, table: pd.DataFrame, column: str, name: str, bound: str) -> None:
     """Raise for the first row where ``good`` is False."""
     wrong = ~np.asarray(good, dtype=bool)
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise RecordingError(f"{name}: row {row + 1}, {column} = {table[column].iloc[row]}, expected {bound}")
+        value = table[column].tolist()[row]
+        raise RecordingError(f"{name}: row {row + 1}, {column} = {value!r}, expected {bound}")
 
 
 def _require_order(table: pd.DataFrame, name: str) -> None:
@@ -356,21 +347,18 @@ def _require_order(table: pd.DataFrame, name: str) -> None:
         row = int(backward[0]) + 1
         late = f"timestamp_us = {stamp[row]:.0f} is earlier than the row before ({stamp[row - 1]:.0f})"
         raise RecordingError(f"{name}: row {row + 1}, {late}")
-    repeated = table.duplicated(["timestamp_us", "hand_id"]).to_numpy()
-    if repeated.any():
-        row = int(np.argmax(repeated))
-        raise RecordingError(
-            f"{name}: row {row + 1}, timestamp_us = {stamp[row]:.0f} is repeated for the same hand"
-        )
+    repeated = np.flatnonzero(table.duplicated(["timestamp_us", "hand_id"]))
+    if repeated.size:
+        row = int(repeated[0])
+        again = f"timestamp_us = {stamp[row]:.0f} is repeated for the same hand"
+        raise RecordingError(f"{name}: row {row + 1}, {again}")
 
 
 def _triples(
     table: pd.DataFrame, columns: tuple[str, ...], scale: float = 1.0
 ) -> list[tuple[float, float, float]]:
     """Return three columns as a list of triples; NaN where the table lacks them."""
-    if columns[0] not in table:
-        return [(np.nan, np.nan, np.nan)] * len(table)
-    values: NDArray[np.float64] = table[list(columns)].to_numpy(float) * scale
+    values: NDArray[np.float64] = table.reindex(columns=list(columns)).to_numpy(float) * scale
     return [tuple(row) for row in values.tolist()]
 
 

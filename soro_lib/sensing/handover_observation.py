@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soro_lib.checks import numbers
 from soro_lib.moved import old_names
 
 
@@ -44,9 +45,8 @@ class HandoverObservation:
 
     def __post_init__(self) -> None:
         for name in ("wrist", "direction", "ball"):
-            vector = getattr(self, name)
-            if vector is not None and np.shape(vector) != (3,):
-                raise ValueError(f"{name} must have shape (3,) or be None, got shape {np.shape(vector)}")
+            if getattr(self, name) is not None:
+                numbers(name, getattr(self, name), (3,))
 
 
 __getattr__ = old_names(__name__)

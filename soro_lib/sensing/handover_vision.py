@@ -7,6 +7,7 @@ from itertools import combinations, product
 import numpy as np
 from numpy.typing import NDArray
 
+from soro_lib.checks import one_of
 from soro_lib.sensing.camera import Image
 from soro_lib.sensing.handover_observation import HandoverObservation
 from soro_lib.sensing.marker_pose import (
@@ -123,8 +124,7 @@ class HandoverVision:
     largest_gap: float = 0.010
 
     def __post_init__(self) -> None:
-        if self.estimator not in ESTIMATORS:
-            raise ValueError(f"estimator must be one of {', '.join(ESTIMATORS)}, got {self.estimator!r}")
+        one_of("estimator", self.estimator, ESTIMATORS)
         if len(self.cameras) < 2:
             raise ValueError(f"two cameras are needed at least, got {len(self.cameras)}")
         self.marker_detector = MarkerDetector(self.ring, corner_shift=self.corner_shift)
@@ -162,22 +162,14 @@ class HandoverVision:
         if apart > self.largest_disagreement:
             pose = ball = None
             trouble = f"the cameras put the wrist {1e3 * apart:.0f} mm apart: swapped or moved?"
+        status = "; ".join(text for text in (trouble, *complaints) if text)
+        observation = HandoverObservation(None, None, ball, disagreement=gap, status=status)
         if pose is not None:
             gripper = pose.wrist + self.gripper_length * pose.direction
             self._last_points = np.concatenate([pose.wrist, gripper])
-        status = "; ".join(text for text in (trouble, *complaints) if text)
-        observation = HandoverObservation(
-            wrist=None if pose is None else pose.wrist,
-            direction=None if pose is None else pose.direction,
-            ball=ball,
-            disagreement=gap,
-            status=status,
-        )
-        if pose is not None:
-            observation = replace(
-                observation,
-                wrist_deviation=pose.wrist_deviation,
-                direction_deviation=pose.direction_deviation,
+            deviations = pose.wrist_deviation, pose.direction_deviation
+            observation = HandoverObservation(
+                pose.wrist, pose.direction, ball, *deviations, disagreement=gap, status=status
             )
         if ball is not None:
             clear = min(sight.fill for sight in chosen if sight is not None) > CLEAR_FILL

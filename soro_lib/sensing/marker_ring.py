@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from soro_lib.checks import check_fields
 from soro_lib.sensing.camera import Image, invert_pose, transform_points
 
 
@@ -37,13 +38,8 @@ class MarkerRing:
     dictionary: int = cv2.aruco.DICT_4X4_50
 
     def __post_init__(self) -> None:
-        if self.sides < 3:
-            raise ValueError(f"MarkerRing.sides must be at least 3, got {self.sides}")
-        if not 0 < self.marker < min(self.width, self.height):
-            raise ValueError(
-                f"MarkerRing.marker must be positive and smaller than its facet of "
-                f"{self.width} x {self.height} m, got {self.marker}"
-            )
+        check_fields(self, "sides", at_least=3)
+        check_fields(self, "marker", above=0, below=min(self.width, self.height))
 
     @property
     def apothem(self) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from soro_lib.checks import check_fields, numbers
 from soro_lib.sensing.bundle_adjustment import adjust, projection_jacobian
 from soro_lib.sensing.camera import Camera, invert_pose, transform_points
 from soro_lib.sensing.feature_matching import FeatureDetector, Features, match_descriptors, match_near
@@ -94,9 +95,7 @@ class TrackerSettings:
     window: int = 6
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0 < value < np.inf:
-                raise ValueError(f"{name} must be finite and above 0, got {value}")
+        check_fields(self, above=0)
 
 
 @dataclass(frozen=True)
@@ -510,9 +509,8 @@ def fit_similarity(measured: ArrayLike, reference: ArrayLike) -> tuple[Array, fl
     ValueError
         If the shapes differ, there are fewer than three points, or they lie on a line.
     """
-    measured, reference = np.asarray(measured, dtype=float), np.asarray(reference, dtype=float)
-    if measured.shape != reference.shape or measured.ndim != 2 or measured.shape[1] != 3 or len(measured) < 3:
-        raise ValueError(f"expected two (n >= 3, 3) arrays, got {measured.shape} and {reference.shape}")
+    measured = numbers("measured", measured, ("n >= 3", 3))
+    reference = numbers("reference", reference, measured.shape)
     centred, target = measured - measured.mean(axis=0), reference - reference.mean(axis=0)
     if np.linalg.matrix_rank(centred, tol=1e-6 * np.linalg.norm(centred)) < 2:
         raise ValueError("positions lie on a line: the rotation about it cannot be found")

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import finite, numbers
 from soro_lib.sensing.camera import Camera, Image, invert_pose, transform_points
 from soro_lib.sensing.marker_ring import MarkerRing
 
@@ -88,15 +89,8 @@ def calibrate(
         If there are too few points, a value is not finite, a corner would lie behind the camera, or the pose
         does not explain the pixels, as when corners were selected in another order.
     """
-    world = np.asarray(corners, dtype=float)
-    seen = np.asarray(pixels, dtype=float)
-    if world.ndim != 2 or world.shape[1:] != (3,) or len(world) < 6 or seen.shape != (len(world), 2):
-        raise CalibrationError(
-            f"calibration needs at least 6 corners (n, 3) and as many pixels (n, 2), "
-            f"got {world.shape} and {seen.shape}"
-        )
-    if not (np.isfinite(world).all() and np.isfinite(seen).all()):
-        raise CalibrationError("calibration: corners and pixels must be finite")
+    world = finite("calibration: corners", corners, ("n >= 6", 3), CalibrationError)
+    seen = finite("calibration: pixels", pixels, (len(world), 2), CalibrationError)
     for start in (None, cv2.SOLVEPNP_SQPNP):
         world_in_camera = _corner_pose(camera, world, seen, start)
         in_camera = transform_points(world_in_camera, world)
@@ -178,12 +172,13 @@ def ray_gap(origins: ArrayLike, directions: ArrayLike) -> float:
 def _checked_rays(
     origins: ArrayLike, directions: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    start, along = np.broadcast_arrays(np.asarray(origins, dtype=float), np.asarray(directions, dtype=float))
-    if start.ndim < 2 or start.shape[-1] != 3 or start.shape[-2] < 2:
-        raise ValueError(f"triangulate: rays must have shape (..., n >= 2, 3), got {start.shape}")
+    start, along = np.broadcast_arrays(
+        finite("triangulate: origins", origins), finite("triangulate: directions", directions)
+    )
+    numbers("triangulate: rays", start, (..., "n >= 2", 3))
     lengths = np.linalg.norm(along, axis=-1, keepdims=True)
-    if not (np.isfinite(start).all() and np.isfinite(along).all() and (lengths > 0).all()):
-        raise ValueError("triangulate: origins must be finite, directions finite and not zero")
+    if not lengths.all():
+        raise ValueError("triangulate: directions must not be zero")
     return start, along / lengths
 
 

@@ -22,6 +22,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import check_fields, finite
 from soro_lib.sensing.camera import Camera, Image, invert_pose, transform_points
 
 Region = tuple[slice, slice]
@@ -76,11 +77,7 @@ class TexturedQuad:
     supersampling: int = 1
 
     def __post_init__(self) -> None:
-        corners = np.asarray(self.corners, dtype=float)
-        if corners.shape != (4, 3) or not np.isfinite(corners).all():
-            raise ValueError(
-                f"TexturedQuad.corners must be four finite points (4, 3), got shape {corners.shape}"
-            )
+        corners = finite("TexturedQuad.corners", self.corners, (4, 3))
         gap = corners[0] - corners[1] + corners[2] - corners[3]
         if np.abs(gap).max() > 1e-6:
             raise ValueError("TexturedQuad.corners must form a parallelogram")
@@ -202,9 +199,7 @@ def render(
     ValueError
         If the pose is not a finite (4, 4) matrix or the background picture has another size than the image.
     """
-    camera_in_world = np.asarray(camera_in_world, dtype=float)
-    if camera_in_world.shape != (4, 4) or not np.isfinite(camera_in_world).all():
-        raise ValueError(f"camera_in_world must be a finite (4, 4) matrix, got shape {camera_in_world.shape}")
+    camera_in_world = finite("camera_in_world", camera_in_world, (4, 4))
     if isinstance(background, np.ndarray):
         if background.shape[:2] != (camera.height, camera.width):
             raise ValueError(
@@ -251,13 +246,8 @@ class Photometry:
     motion: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name in ("gain", "read_noise", "shot_noise", "blur"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise ValueError(
-                    f"Photometry.{name} must be finite and not negative, got {getattr(self, name)}"
-                )
-        if not np.isfinite(self.motion).all():
-            raise ValueError(f"Photometry.motion must be finite, got {self.motion}")
+        check_fields(self, "gain", "read_noise", "shot_noise", "blur", at_least=0)
+        check_fields(self, "motion", shape=(2,))
 
 
 def expose(image: Image, photometry: Photometry, noise: NDArray[np.float32]) -> Image:
@@ -270,8 +260,7 @@ def expose(image: Image, photometry: Photometry, noise: NDArray[np.float32]) -> 
     photometry : Photometry
         Gain, noise and blur. The variance of a pixel is ``read_noise**2 + shot_noise * signal``.
     noise : array of the image's shape, float32
-        Standard normal numbers: ``rng.standard_normal(image.shape, dtype=np.float32)``, or from a
-        :class:`NoiseBank` where drawing that many takes too long.
+        Standard normal numbers: ``rng.standard_normal(image.shape, dtype=np.float32)``.
 
     Returns
     -------
@@ -302,29 +291,6 @@ def motion_kernel(right: float, down: float) -> NDArray[np.float32]:
     ends = _fixed_point(np.array([size // 2 - half, size // 2 + half]))
     cv2.line(kernel, ends[0], ends[1], 1.0, 1, cv2.LINE_8, shift=4)
     return kernel / kernel.sum()
-
-
-class NoiseBank:
-    """Sensor noise for long films: a few noise pictures made once, shifted at random for every frame.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Shape of the images.
-    rng : numpy.random.Generator
-        Source of the pictures.
-    count : int, optional
-        Number of pictures.
-    """
-
-    def __init__(self, shape: tuple[int, ...], rng: np.random.Generator, count: int = 6) -> None:
-        self._pictures = rng.standard_normal((count, *shape), dtype=np.float32)
-
-    def draw(self, rng: np.random.Generator) -> NDArray[np.float32]:
-        """Return standard normal noise of the bank's shape, float32."""
-        picture = self._pictures[rng.integers(len(self._pictures))]
-        rows, columns = (int(rng.integers(size)) for size in picture.shape[:2])
-        return np.roll(picture, (rows, columns), axis=(0, 1))
 
 
 def image_region(pixels: NDArray[np.float64], image: Image) -> Region | None:

@@ -26,7 +26,7 @@ STRIP_SHADES = (0.62, 0.85, 1.0, 0.8)
 
 
 @dataclass(frozen=True, eq=False)
-class Sphere:
+class Ball:
     """A matt ball under one distant lamp; its outline and shading are exact for every pixel.
 
     Parameters

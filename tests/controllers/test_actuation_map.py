@@ -27,7 +27,7 @@ def test_map_is_monotone_between_its_points():
 @pytest.mark.parametrize(
     ("motor", "chamber", "message"),
     [
-        ([1.0], [1.0], "n >= 2"),
+        ([1.0], [1.0], r"motor_lengths must have shape \(n >= 2,\), got \(1,\)"),
         ([1.0, 2.0], [2.0, 1.0], "chamber_lengths"),
         ([1.0, np.nan], [1.0, 2.0], "motor"),
     ],

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from soro_lib.controllers import GestureSteering
 from soro_lib.controllers.gesture_steering import SteeringSettings, replay
-from soro_lib.controllers.gestures import Mode
+from soro_lib.controllers.gestures import Gesture
 from soro_lib.controllers.hand_mapping import PalmMapping
 from soro_lib.controllers.obstacles import Sphere, smallest_clearance
 from soro_lib.controllers.steering_step import Step, StepWeights
@@ -33,10 +33,10 @@ ARM = CableDrivenArm()
 PERIOD = 0.0087
 FLAT = HandSample(0.0, 1, (0.03, 0.2, 0.02), (0.0, -1.0, 0.0), (True,) * 5)
 VECTORS = {
-    Mode.PALM: (True,) * 5,
-    Mode.FIST: (False,) * 5,
-    Mode.V_SIGN: (False, True, True, False, False),
-    Mode.THUMBS_UP: (True, False, False, False, False),
+    Gesture.PALM: (True,) * 5,
+    Gesture.FIST: (False,) * 5,
+    Gesture.V_SIGN: (False, True, True, False, False),
+    Gesture.THUMBS_UP: (True, False, False, False, False),
 }
 
 
@@ -78,15 +78,15 @@ def test_algorithm_1_follows_a_hand():
 
 
 def test_v_sign_keeps_only_the_height():
-    sample = replace(FLAT, normal=(0.3, -math.sqrt(0.91), 0.0), fingers=VECTORS[Mode.V_SIGN])
+    sample = replace(FLAT, normal=(0.3, -math.sqrt(0.91), 0.0), fingers=VECTORS[Gesture.V_SIGN])
     result, _ = held(GestureSteering(ARM), sample, 3.0, 0.0)
-    assert result.mode is Mode.V_SIGN
+    assert result.mode is Gesture.V_SIGN
     np.testing.assert_allclose(result.tip, (0, 0, 0.11), atol=1e-5)
     np.testing.assert_allclose(result.direction[0], 0.3, atol=1e-3)
 
 
 def test_thumbs_up_is_straight():
-    sample = replace(FLAT, normal=(0.3, -math.sqrt(0.91), 0.0), fingers=VECTORS[Mode.THUMBS_UP])
+    sample = replace(FLAT, normal=(0.3, -math.sqrt(0.91), 0.0), fingers=VECTORS[Gesture.THUMBS_UP])
     result, _ = held(GestureSteering(ARM), sample, 3.0, 0.0)
     np.testing.assert_allclose(result.tip, (0, 0, 0.11), atol=1e-5)
     np.testing.assert_allclose(result.direction, (0, 0, 1), atol=1e-4)
@@ -95,9 +95,9 @@ def test_thumbs_up_is_straight():
 def test_fist_locks_the_middle_and_moves_the_tip():
     steering = GestureSteering(ARM)
     before, time = held(steering, FLAT, 3.0, 0.0)
-    fist = replace(FLAT, fingers=VECTORS[Mode.FIST])
+    fist = replace(FLAT, fingers=VECTORS[Gesture.FIST])
     result, time = held(steering, fist, 0.5, time)
-    assert result.mode is Mode.FIST
+    assert result.mode is Gesture.FIST
     moved, _ = held(steering, replace(fist, palm=(0.06, 0.2, -0.02)), 3.0, time)
     assert np.linalg.norm(moved.mid - before.mid) < 2e-3
     assert np.linalg.norm(moved.tip - before.tip) > 5e-3
@@ -128,9 +128,11 @@ def test_direction_filter_acts_behind_the_gesture():
     turns = []
     for index in range(80):
         before = result.target_direction
-        result = steering.update(replace(tilted, time=time + index * PERIOD, fingers=VECTORS[Mode.THUMBS_UP]))
+        result = steering.update(
+            replace(tilted, time=time + index * PERIOD, fingers=VECTORS[Gesture.THUMBS_UP])
+        )
         turns.append(np.degrees(np.arccos(np.clip(before @ result.target_direction, -1, 1))))
-    assert result.mode is Mode.THUMBS_UP
+    assert result.mode is Gesture.THUMBS_UP
     assert max(turns) < 4.0
     assert sum(turns) > 20.0
 
@@ -269,7 +271,13 @@ def test_open_and_fist_are_recognised_in_a_real_recording():
     table = load_hand_recording(REAL / "lmc04_open_fist.csv")
     modes = [result.mode for result in replay(GestureSteering(ARM), list(hand_samples(table)))]
     changes = [mode for index, mode in enumerate(modes) if index == 0 or mode is not modes[index - 1]]
-    assert changes == [Mode.PALM, Mode.FIST, Mode.PALM, Mode.FIST, Mode.PALM]
+    assert changes == [
+        Gesture.PALM,
+        Gesture.FIST,
+        Gesture.PALM,
+        Gesture.FIST,
+        Gesture.PALM,
+    ]
 
 
 @pytest.mark.parametrize(

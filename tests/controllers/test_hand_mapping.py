@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from soro_lib.controllers.gestures import Mode
+from soro_lib.controllers.gestures import Gesture
 from soro_lib.controllers.hand_mapping import PalmMapping, TipGoal, constrained_goal, limited_tilt
 
 coordinate = st.floats(-0.3, 0.3)
@@ -69,9 +69,9 @@ def test_printed_gesture_matrices_do_not_constrain():
     np.testing.assert_allclose((plain @ palm)[:3, 3], (31.0, 21.0, 111.0))
 
     goal = TipGoal((0.03, 0.02, 0.11), (0.3, 0.0, math.sqrt(0.91)))
-    assert constrained_goal(Mode.V_SIGN, goal) == TipGoal((0.0, 0.0, 0.11), goal.direction)
-    assert constrained_goal(Mode.THUMBS_UP, goal) == TipGoal((0.0, 0.0, 0.11), (0.0, 0.0, 1.0))
-    assert constrained_goal(Mode.PALM, goal) == constrained_goal(Mode.FIST, goal) == goal
+    assert constrained_goal(Gesture.V_SIGN, goal) == TipGoal((0.0, 0.0, 0.11), goal.direction)
+    assert constrained_goal(Gesture.THUMBS_UP, goal) == TipGoal((0.0, 0.0, 0.11), (0.0, 0.0, 1.0))
+    assert constrained_goal(Gesture.PALM, goal) == constrained_goal(Gesture.FIST, goal) == goal
 
 
 @given(st.tuples(coordinate, st.floats(0.1, 0.4), coordinate))

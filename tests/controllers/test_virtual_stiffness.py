@@ -230,7 +230,7 @@ def test_bad_input_is_named(position):
 
 
 def test_limit_state_refuses_what_is_no_state():
-    with pytest.raises(ValueError, match="nine finite numbers"):
+    with pytest.raises(ValueError, match=r"q must be finite, got nan at index \(0,\)"):
         limit_state([np.nan] * 9, SOFTNESS)
     with pytest.raises(ValueError, match="inverse_stiffness"):
         limit_state(ARM.home, [1.0, 2.0])

@@ -76,7 +76,7 @@ def test_first_solution_is_the_pseudoinverse_where_that_is_well_conditioned():
 def test_labels_must_be_one_row_per_sample():
     """Erratum VS-6: Z_c as defined is 7 x N0; Phi beta = Z_c needs N0 x 7."""
     shifts, poses = samples(np.random.default_rng(3), 50)
-    with pytest.raises(ValueError, match=r"poses \(50, 7\)"):
+    with pytest.raises(ValueError, match=r"poses must have shape \(50, 7\), got \(7, 50\)"):
         network().fit(shifts, poses.T)
 
 
@@ -248,7 +248,7 @@ def test_variance_covers_the_prediction_error():
 @pytest.mark.parametrize(
     ("shift", "message"),
     [
-        (np.zeros(3), "4 gratings"),
+        (np.zeros(3), r"shift must have shape \(\.\.\., 4\), got \(3,\)"),
         (np.array([0.0, np.nan, 0.0, np.inf]), r"gratings \[1, 3\]"),
     ],
 )

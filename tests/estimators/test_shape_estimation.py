@@ -70,9 +70,9 @@ def test_a_pose_that_no_state_has_is_reported():
         ({"q_sys": np.full(9, np.nan)}, "q_sys must be finite"),
         ({"measured_points": [0, 0, np.inf, 0, 0, 0]}, "measured_points must be finite"),
         ({"measured_points": []}, "measured_points must have shape"),
-        ({"bound": 0.0}, "bound must be positive"),
-        ({"bound": np.nan}, "bound must be positive"),
-        ({"weights": np.zeros(9)}, "weights must be positive"),
+        ({"bound": 0.0}, "bound must be a finite number above 0"),
+        ({"bound": np.nan}, "bound must be a finite number above 0"),
+        ({"weights": np.zeros(9)}, "weights must be a finite number above 0"),
     ],
 )
 def test_bad_input_is_named(arguments, message):

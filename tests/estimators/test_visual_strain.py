@@ -133,9 +133,9 @@ def test_bad_frames_are_not_learned(recording):
 
 
 def test_wrong_shapes_are_named():
-    with pytest.raises(ValueError, match="shift must be"):
+    with pytest.raises(ValueError, match=r"shift must have shape \(17,\), got \(3,\)"):
         make_estimator().update(0.0, np.zeros(3), None, 1.0)
-    with pytest.raises(ValueError, match="camera_pose must be"):
+    with pytest.raises(ValueError, match=r"camera_pose must have shape \(7,\), got \(6,\)"):
         make_estimator().update(0.0, np.zeros(17), np.zeros(6), 1.0)
 
 

@@ -215,11 +215,11 @@ def test_equation_25_jacobian_is_wide():
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"young_modulus": -1.0}, "young_modulus must be finite and positive, got -1.0"),
-        ({"cable_radius": np.nan}, "cable_radius must be finite and positive, got nan"),
-        ({"inner_radius": 5e-3}, r"inner_radius must be in \[0, outer_radius = 0.0045\), got 0.005"),
-        ({"coupling_sign": 0}, r"coupling_sign must be -1 or \+1, got 0"),
-        ({"cap_length": -1e-3}, "cap_length must be finite and at least 0, got -0.001"),
+        ({"young_modulus": -1.0}, "young_modulus must be a finite number above 0, got -1.0"),
+        ({"cable_radius": np.nan}, "cable_radius must be a finite number above 0, got nan"),
+        ({"inner_radius": 5e-3}, r"inner_radius must be in \[0, 0.0045\), got 0.005"),
+        ({"coupling_sign": 0}, "coupling_sign must be one of -1, 1; got 0"),
+        ({"cap_length": -1e-3}, "cap_length must be a finite number not below 0, got -0.001"),
         ({"maximum_tension": 10.0}, "maximum_tension 10.0 N on six cables shortens"),
     ],
 )

@@ -227,11 +227,14 @@ def test_plus_dx_tilts_the_tip_toward_plus_x():
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"tendon_radius": -0.03}, "tendon_radius must be finite and positive"),
-        ({"rest_lengths": (0.12, 0.24)}, r"rest_lengths must be three finite numbers, got \(0.12, 0.24\)"),
+        ({"tendon_radius": -0.03}, "tendon_radius must be a finite number above 0"),
+        ({"rest_lengths": (0.12, 0.24)}, r"rest_lengths must have shape \(3,\), got \(2,\)"),
         ({"rest_lengths": (0.2, 0.24, 0.24)}, r"rest_lengths\[0\] must be in \[0.08, 0.14\], got 0.2"),
-        ({"maximum_bends": (0.0, 1.0, 1.0)}, r"maximum_bends\[0\] must be finite and positive"),
-        ({"tendon_offsets": (0.0, np.nan, 0.0)}, "tendon_offsets must be three finite numbers"),
+        (
+            {"maximum_bends": (0.0, 1.0, 1.0)},
+            r"maximum_bends must be a .* above 0, got 0.0 at index \(0,\)",
+        ),
+        ({"tendon_offsets": (0.0, np.nan, 0.0)}, r"tendon_offsets must be finite, got nan at index \(1,\)"),
         ({"motor_orientations": (1,) * 8}, r"motor_orientations must be nine of -1 and \+1"),
     ],
 )

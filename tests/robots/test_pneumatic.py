@@ -115,10 +115,10 @@ def test_motor_commands_scale_the_elongations():
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"chamber_distance": 0.0}, "chamber_distance must be finite and positive"),
-        ({"rest_length": 0.2}, "minimum_length <= rest_length <= maximum_length must hold"),
-        ({"maximum_length": np.nan}, "minimum_length <= rest_length <= maximum_length must hold"),
-        ({"motor_gains": (1.0, 0.0, 1.0)}, "motor_gains must be three finite numbers other than 0"),
+        ({"chamber_distance": 0.0}, "chamber_distance must be a finite number above 0"),
+        ({"rest_length": 0.2}, r"rest_length must be in \[0.045, 0.18\], got 0.2"),
+        ({"maximum_length": np.nan}, "maximum_length must be a finite number not below 0.045, got nan"),
+        ({"motor_gains": (1.0, 0.0, 1.0)}, "motor_gains must be other than 0"),
     ],
 )
 def test_bad_parameters_are_refused(parameters, message):

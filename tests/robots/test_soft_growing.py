@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from soro_lib.poses import angle_between
 from soro_lib.robots import ActuationError, SoftGrowingArm, redistribute_actuation
 from soro_lib.robots.soft_growing import (
     MOTOR_ANGLES,
@@ -34,7 +33,7 @@ def test_tip_is_the_actuation_and_points_along_the_body(tip):
 def test_tip_frame_is_the_shortest_turn_of_the_base_frame(tip):
     rotation = ARM.forward(tip)[:3, :3]
     turn = np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1))
-    assert turn == pytest.approx(float(angle_between([0.0, 0.0, 1.0], tip)), abs=1e-7)
+    assert turn == pytest.approx(np.arctan2(np.hypot(tip[0], tip[1]), tip[2]), abs=1e-7)
     assert ARM.configuration(tip)[0, 2] == 0.0
 
 
@@ -113,7 +112,7 @@ def test_redistribution_steers_to_the_same_point(commands, epsilon):
 
 def test_redistribution_of_the_paper():
     np.testing.assert_allclose(redistribute_actuation([10.0, 0.0, 4.0]), [7.0, -3.0, 1.0], rtol=1e-15)
-    np.testing.assert_array_equal(ARM.redistribute_actuation([10.0, 0.0, 4.0], epsilon=0.0), [10.0, 0.0, 4.0])
+    np.testing.assert_array_equal(redistribute_actuation([10.0, 0.0, 4.0], epsilon=0.0), [10.0, 0.0, 4.0])
 
 
 def test_redistribution_is_required_when_the_idle_motor_changes():
@@ -209,7 +208,7 @@ def test_bad_input_is_refused():
     [
         ({"lower_limit": (0.0, 0.0, 0.0)}, r"lower_limit\[2\] \(z\) must be above 0"),
         ({"upper_limit": (0.0, 0.0, 0.005)}, "lower_limit must be below upper_limit"),
-        ({"upper_limit": (1.0, 1.0, np.nan)}, "lower_limit must be below upper_limit"),
+        ({"upper_limit": (1.0, 1.0, np.nan)}, r"upper_limit must be finite, got nan at index \(2,\)"),
     ],
 )
 def test_bad_parameters_are_refused(parameters, message):

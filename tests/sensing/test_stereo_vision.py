@@ -78,8 +78,8 @@ def test_calibration_survives_a_bad_linear_start():
 @pytest.mark.parametrize(
     ("corners", "pixels", "message"),
     [
-        (box_corners()[:5], np.zeros((5, 2)), "at least 6"),
-        (box_corners(), np.zeros((5, 2)), "as many"),
+        (box_corners()[:5], np.zeros((5, 2)), r"corners must have shape \(n >= 6, 3\), got \(5, 3\)"),
+        (box_corners(), np.zeros((5, 2)), r"pixels must have shape \(6, 2\), got \(5, 2\)"),
         (box_corners(), np.full((6, 2), np.nan), "finite"),
         (box_corners(), CAMERAS[0].project(box_corners())[[1, 0, 2, 3, 5, 4]], "order"),
         (box_corners(), CAMERAS[0].project(box_corners())[::-1], "order|front"),

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from soro_lib.sensing.camera import Camera, clip_half_space, invert_pose, look_at, transform_points
 from soro_lib.worlds.rendering import (
-    NoiseBank,
     Photometry,
     Polygon,
     TexturedQuad,
@@ -17,7 +16,7 @@ from soro_lib.worlds.rendering import (
     motion_kernel,
     render,
 )
-from soro_lib.worlds.round_bodies import Sphere
+from soro_lib.worlds.round_bodies import Ball
 
 PINHOLE = Camera(320, 240, 260.0)
 DISTORTING = Camera(320, 240, 260.0, principal_point=(162.0, 118.0), distortion=(0.06, -0.10, 0.001, -0.002))
@@ -90,10 +89,10 @@ def test_a_quad_is_invisible_from_behind_and_a_polygon_is_not():
 
 
 def test_the_near_thing_hides_the_far_one_and_layers_come_first():
-    near, far = Sphere(np.array([0, 0, 0.5]), 0.05, 250), Sphere(np.array([0, 0, 0.9]), 0.2, 100)
+    near, far = Ball(np.array([0, 0, 0.5]), 0.05, 250), Ball(np.array([0, 0, 0.9]), 0.2, 100)
     assert render(PINHOLE, np.eye(4), [near, far])[120, 160] == 250
     assert render(PINHOLE, np.eye(4), [far, near])[120, 160] == 250
-    covering = Sphere(np.array([0, 0, 0.9]), 0.2, 100, layer=1)
+    covering = Ball(np.array([0, 0, 0.9]), 0.2, 100, layer=1)
     assert render(PINHOLE, np.eye(4), [near, covering])[120, 160] == 100
 
 
@@ -165,13 +164,6 @@ def test_expose_without_noise_is_the_image_in_colour_too():
     image = np.random.default_rng(5).integers(0, 255, (20, 30, 3), dtype=np.uint8)
     np.testing.assert_array_equal(expose(image, quiet(), np.zeros(image.shape, np.float32)), image)
     assert expose(image, quiet(2.0), np.zeros(image.shape, np.float32)).max() == 255
-
-
-def test_noise_bank_is_white_and_repeatable():
-    bank = NoiseBank((60, 80), np.random.default_rng(6))
-    first, second = bank.draw(np.random.default_rng(7)), bank.draw(np.random.default_rng(7))
-    np.testing.assert_array_equal(first, second)
-    assert first.std() == pytest.approx(1, abs=0.05)
 
 
 @pytest.mark.parametrize(

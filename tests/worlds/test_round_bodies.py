@@ -10,7 +10,7 @@ from soro_lib.sensing.camera import NEAR, Camera, invert_pose, transform_points
 from soro_lib.worlds.rendering import render
 from soro_lib.worlds.round_bodies import (
     STRIPS,
-    Sphere,
+    Ball,
     Tube,
     ball_samples,
     distorted,
@@ -36,7 +36,7 @@ def test_compiled_projection_is_the_camera_s(camera):
 @pytest.mark.parametrize("camera", [PINHOLE, DISTORTING])
 def test_sphere_has_the_outline_of_its_tangent_cone(camera):
     centre, radius = np.array([0.12, -0.05, 0.5]), 0.05
-    image = render(camera, np.eye(4), [Sphere(centre, radius, 255, supersampling=4)])
+    image = render(camera, np.eye(4), [Ball(centre, radius, 255, supersampling=4)])
     rays = camera.rays(np.indices((240, 320))[::-1].reshape(2, -1).T.astype(float))
     cosine = rays @ centre / np.linalg.norm(rays, axis=1) / np.linalg.norm(centre)
     inside = (cosine > np.cos(np.arcsin(radius / np.linalg.norm(centre)))).reshape(240, 320)
@@ -45,7 +45,7 @@ def test_sphere_has_the_outline_of_its_tangent_cone(camera):
 
 
 def test_sphere_is_brightest_toward_the_lamp():
-    image = render(PINHOLE, np.eye(4), [Sphere(np.array([0, 0, 0.5]), 0.1, 200, (0, -1, 0), ambient=0.2)])
+    image = render(PINHOLE, np.eye(4), [Ball(np.array([0, 0, 0.5]), 0.1, 200, (0, -1, 0), ambient=0.2)])
     assert image[85, 160] > image[120, 160] >= image[155, 160] == pytest.approx(40, abs=1)
 
 
@@ -69,7 +69,7 @@ def test_compiled_ball_is_that_of_the_rays_to_the_byte(camera):
     rng = np.random.default_rng(2)
     for _ in range(10):
         centre = rng.uniform([-0.2, -0.15, 0.4], [0.2, 0.15, 0.9])
-        ball = Sphere(centre, rng.uniform(0.01, 0.05), tuple(rng.integers(256, size=3).tolist()), ambient=0.5)
+        ball = Ball(centre, rng.uniform(0.01, 0.05), tuple(rng.integers(256, size=3).tolist()), ambient=0.5)
         light = rng.normal(size=3)
         light /= np.linalg.norm(light)
         middle = 2 * camera.project(centre)[0].astype(int)

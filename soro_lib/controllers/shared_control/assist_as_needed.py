@@ -9,12 +9,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from soro_lib.checks import not_negative, positive, sample_count, vector
+from soro_lib.checks import not_negative, one_of, positive, vector
 from soro_lib.controllers.shared_control.guidance import (
     Guidance,
     distance_to_goal,
     guidance_force,
     hooke_magnitude,
+    sample_count,
 )
 from soro_lib.jit import inlined
 
@@ -191,8 +192,7 @@ class AssistAsNeeded:
         counter: Literal["text", "caption", "program"] = "text",
         unit_direction: bool = True,
     ) -> None:
-        if counter not in COUNTERS:
-            raise ValueError(f'counter must be "text", "caption" or "program", got {counter!r}')
+        one_of("counter", counter, COUNTERS)
         self.maximum_force = positive("maximum_force", maximum_force)
         self.sample_rate = positive("sample_rate", sample_rate)
         self.unit_direction = bool(unit_direction)

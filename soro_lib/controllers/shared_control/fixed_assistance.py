@@ -8,12 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import not_negative, positive, sample_count, vector
+from soro_lib.checks import not_negative, positive, vector
 from soro_lib.controllers.shared_control.guidance import (
     Guidance,
     damped_magnitude,
     distance_to_goal,
     guidance_force,
+    sample_count,
 )
 from soro_lib.jit import inlined
 

@@ -3,13 +3,14 @@
 Source: Stroppa et al., Fig. 4.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import Vector, goal_points, positive, vector
+from soro_lib.checks import Vector, finite, positive, vector
 from soro_lib.jit import inlined
 
 PHASES = ("start", "grasping", "lifting with item", "placing", "lifting empty", "end")
@@ -173,3 +174,17 @@ class GoalSelection:
         """
         self.state = goal_step(self.rule, self.state, vector("end_effector", end_effector), bool(item_held))
         return GoalResult(np.array(self.state.goal), PHASES[self.state.phase], self.state.item)
+
+
+def goal_points(name: str, value: ArrayLike, reach: float) -> tuple[Vector, ...]:
+    """Return goals (n, 3) as a tuple of points, each finite, below the base and within reach."""
+    points = tuple((x, y, z) for x, y, z in finite(name, value, ("n", 3)).tolist())
+    for index, point in enumerate(points):
+        distance = math.hypot(*point)
+        if point[2] <= 0:
+            raise ValueError(f"{name}[{index}] must lie below the base (z > 0), got z = {point[2]} m")
+        if distance > reach:
+            raise ValueError(
+                f"{name}[{index}] is out of reach: {distance:.3f} m from the base, bound {reach} m"
+            )
+    return points

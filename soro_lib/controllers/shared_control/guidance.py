@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soro_lib.checks import Vector
+from soro_lib.checks import Vector, positive
 from soro_lib.jit import inlined
 
 
@@ -83,3 +83,8 @@ class Guidance:
     magnitude: float
     force: NDArray[np.float64]
     state: str
+
+
+def sample_count(elapsed: float | None, sample_rate: float) -> float:
+    """Return the time since the last sample [s] in sample periods; one where no time is given."""
+    return 1.0 if elapsed is None else positive("elapsed", elapsed) * sample_rate

@@ -6,9 +6,7 @@ Source: Stroppa et al., Section 4, Table 1.
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from soro_lib.checks import Vector, finite_vector
+from soro_lib.checks import Vector, finite, one_of
 from soro_lib.jit import inlined
 
 ASSISTANCES = ("none", "as needed", "fixed")
@@ -38,11 +36,8 @@ class Paradigm:
     assistance: Literal["none", "as needed", "fixed"] = "none"
 
     def __post_init__(self) -> None:
-        shares = finite_vector("automation", self.automation)
-        if np.any(shares < 0) or np.any(shares > 1):
-            raise ValueError(f"automation must lie in [0, 1] for each axis, got {tuple(shares)}")
-        if self.assistance not in ASSISTANCES:
-            raise ValueError(f"assistance must be one of {ASSISTANCES}, got {self.assistance!r}")
+        finite("automation", self.automation, (3,), at_least=0, at_most=1)
+        one_of("assistance", self.assistance, ASSISTANCES)
 
     @property
     def lifts(self) -> bool:

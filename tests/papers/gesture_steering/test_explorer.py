@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from IPython.display import Image
 
-from soro_lib.controllers.gestures import Mode
+from soro_lib.controllers.gestures import Gesture
 from soro_lib.papers.gesture_steering.explorer import SteeringExplorer, explore
 
 
@@ -42,7 +42,7 @@ def test_a_button_is_a_gesture(explorer):
     explorer.pad.x = 0.8
     explorer.gesture.value = "v_sign"
     result = explorer.advance(2.0)
-    assert result.mode is Mode.V_SIGN
+    assert result.mode is Gesture.V_SIGN
     np.testing.assert_allclose(result.tip[:2], 0.0, atol=1e-5)
 
 

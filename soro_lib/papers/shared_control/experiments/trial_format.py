@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from soro_lib.checks import goal_points, positive, vector
+from soro_lib.checks import positive, vector
 from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.controllers.shared_control.assist_as_needed import MOTIONS
-from soro_lib.controllers.shared_control.goal_selection import PHASES
+from soro_lib.controllers.shared_control.goal_selection import PHASES, goal_points
 from soro_lib.papers.shared_control.experiments.task import Scene, TaskSettings, Trial
 from soro_lib.papers.shared_control.world.people import EXPERT
 

@@ -23,7 +23,7 @@ from soro_lib.robots.helix import HelixArm
 from soro_lib.sensing.camera import Camera, Image, look_at, transform_points
 from soro_lib.sensing.marker_ring import MarkerRing
 from soro_lib.worlds.rendering import Drawable, Photometry, Polygon, TexturedQuad, motion_kernel, render
-from soro_lib.worlds.round_bodies import Color, Sphere, Tube
+from soro_lib.worlds.round_bodies import Ball, Color, Tube
 
 BRIO = Camera(
     1280, 720, focal_length=907.0, principal_point=(643.5, 356.5), distortion=(0.06, -0.10, 0.0, 0.0)
@@ -191,11 +191,9 @@ class HandoverScene:
             parts.append(Tube(transform_points(wrist, finger), 0.007, (PLASTIC,)))
         return parts
 
-    def ball(self, centre: NDArray[np.float64]) -> Sphere:
+    def ball(self, centre: NDArray[np.float64]) -> Ball:
         """Return the green ball with its middle at a point (3,) [m]."""
-        return Sphere(
-            centre, self.ball_radius, BALL, to_light=(0.3, 0.5, -1.0), ambient=0.55, supersampling=2
-        )
+        return Ball(centre, self.ball_radius, BALL, to_light=(0.3, 0.5, -1.0), ambient=0.55, supersampling=2)
 
     def _hand(self, ball: NDArray[np.float64]) -> list[Drawable]:
         """Return a palm under the ball, fingers and a forearm that comes from outside and below."""
@@ -257,7 +255,7 @@ def _room(camera: Camera, pose: bytes) -> Image:
         ),
     ]
     for x, z in ((-0.75, 0.62), (-0.62, 0.72), (-0.84, 0.76)):
-        items.append(Sphere(np.array([x, -1.2, z]), 0.11, DULL_GREEN, UP, 0.4, layer=-4))
+        items.append(Ball(np.array([x, -1.2, z]), 0.11, DULL_GREEN, UP, 0.4, layer=-4))
     image = render(camera, np.frombuffer(pose).reshape(4, 4), items, background=(160, 165, 170))
     image = np.asarray(cv2.GaussianBlur(image, (0, 0), 2.5), dtype=np.uint8)
     image.setflags(write=False)

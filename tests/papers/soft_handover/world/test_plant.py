@@ -13,7 +13,6 @@ from soro_lib.papers.soft_handover.world.plant import (
     Stiffness,
 )
 from soro_lib.robots import HelixArm
-from soro_lib.robots.helix_motors import TendonMotors
 
 ARM = HelixArm()
 BENT = np.array([0.3, -0.2, 0.11, 0.5, 0.4, 0.22, -0.6, 0.1, 0.24])
@@ -115,22 +114,6 @@ def test_lagging_plant_covers_its_share_of_the_way():
     np.testing.assert_allclose(after, start + (1 - np.exp(-0.5)) * (BENT - start), atol=1e-12)
 
 
-def test_motors_round_to_ticks_and_stay_in_range():
-    motors = TendonMotors()
-    pulled = motors.pull(np.full(9, 0.01234)) - ARM.tendon_lengths(ARM.home)
-    assert np.abs(pulled - 0.01234).max() <= np.pi / 4096 * ARM.pulley_radius + 1e-12
-    clipped, cut = motors.clip(np.full(9, 0.3))
-    assert cut.all()
-    assert (clipped == 0.1).all()
-    assert (motors.clip(np.full(9, -0.3))[0] == np.array([-0.1] * 3 + [-0.2] * 6)).all()
-
-
-@pytest.mark.parametrize("change", [np.full(9, np.nan), np.zeros(8), np.full(9, np.inf)])
-def test_motors_refuse_what_is_no_command(change):
-    with pytest.raises(ValueError, match="nine finite numbers"):
-        TendonMotors().pull(change)
-
-
 def test_gripper_holds_what_lies_between_its_fingers():
     points = np.array([0.1, 0.0, 0.5, 0.1, 0.0, 0.6])
     gripper = Gripper(opening=0.04, reach=0.03)
@@ -149,8 +132,6 @@ def test_gripper_holds_what_lies_between_its_fingers():
         (lambda: ElasticPlant(gripper_mass=-1), "gripper_mass"),
         (lambda: Stiffness(bending=0), "bending"),
         (lambda: LaggingPlant(ElasticPlant(), 0.0, 1.0), "timestep"),
-        (lambda: TendonMotors(ticks_per_turn=0), "ticks_per_turn"),
-        (lambda: TendonMotors(shortest=(0.2,) * 9), "shortest"),
         (lambda: Gripper(opening=-0.1), "opening"),
     ],
 )
