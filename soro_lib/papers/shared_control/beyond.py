@@ -5,8 +5,9 @@ ask what a sceptical reader asks. The paper reports no instability and no bound 
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -27,41 +28,52 @@ from soro_lib.papers.shared_control.experiments.claims import (
 )
 from soro_lib.papers.shared_control.experiments.demonstrations import KINDS, draw_operators
 from soro_lib.papers.shared_control.experiments.factorial import CONTRASTS, contrast_samples, run_factorial
-from soro_lib.papers.shared_control.experiments.simulation import person_plans, simulate
+from soro_lib.papers.shared_control.experiments.simulation import TrialPlan, person_plans, simulate
 from soro_lib.papers.shared_control.experiments.task import TaskSettings
 from soro_lib.papers.shared_control.world.people import ATTITUDES, DEVICE_SCALE, EXPERT, NAIVE, Operator
 from soro_lib.papers.shared_control.world.plant import PlantParameters
 
 # --- Sweeps over one or two parameters of the task or the operator ------------------------------------------
 
-Case = tuple[Mapping[str, Any], TaskSettings, Sequence[Operator]]
-"""Labels of a case, the task, and who does it."""
+Case = tuple[TaskSettings, Sequence[Operator]]
+"""A task, and who does it."""
 
 
-def sweep(cases: Iterable[Case], stream: Sequence[int], trials: int = 1, **run: Any) -> pd.DataFrame:
-    """Simulate every case; all of them meet the same chance.
+def sweep(
+    case: Callable[..., Case],
+    seed: Sequence[int],
+    trials: int,
+    run: Mapping[str, Any],
+    /,
+    **factors: Iterable[Any],
+) -> pd.DataFrame:
+    """Simulate every combination of the factors; all of them meet the same chance.
 
     Parameters
     ----------
-    cases : iterable of Case
-    stream : sequence of int
+    case : callable
+        Takes one value of each factor by name.
+    seed : sequence of int
         Entropy of the sweep.
     trials : int
         Of every person in every case.
-    **run
+    run : mapping
         time_limit, jobs, scheduler or store of `simulate`.
+    **factors
+        Values of each factor, the first varies slowest.
 
     Returns
     -------
     pandas.DataFrame
-        One line per trial: labels of the case, operator, trial, metrics.
+        One line per trial: the factors, operator, trial, metrics.
     """
-    plans = (
-        plan
-        for labels, settings, people in cases
-        for plan in person_plans(settings, people, stream, trials, labels)
-    )
-    return simulate(plans, **run)
+
+    def plans() -> Iterator[TrialPlan]:
+        for values in product(*factors.values()):
+            labels = dict(zip(factors, values, strict=True))
+            yield from person_plans(*case(**labels), seed, trials, labels)
+
+    return simulate(plans(), **run)
 
 
 def blend_surface(
@@ -85,17 +97,12 @@ def blend_surface(
     pandas.DataFrame
         One line per trial; labels kind, steering, eversion, operator, trial.
     """
-    cases = (
-        (
-            {"kind": kind, "steering": steering, "eversion": eversion},
-            TaskSettings(Paradigm("Blend", (steering, steering, eversion))),
-            draw_operators(kind, operators, seed),
-        )
-        for kind in kinds
-        for steering in shares
-        for eversion in shares
-    )
-    return sweep(cases, (seed, 4), **run)
+
+    def case(kind: str, steering: float, eversion: float) -> Case:
+        blend = Paradigm("Blend", (steering, steering, eversion))
+        return TaskSettings(blend), draw_operators(kind, operators, seed)
+
+    return sweep(case, (seed, 4), 1, run, kind=kinds, steering=shares, eversion=shares)
 
 
 def misdetection_cost(operators: int, seed: int, offsets: Sequence[float], **run: Any) -> pd.DataFrame:
@@ -106,17 +113,14 @@ def misdetection_cost(operators: int, seed: int, offsets: Sequence[float], **run
     pandas.DataFrame
         One line per trial; labels kind, paradigm, offset_mm, operator, trial.
     """
-    cases = (
-        (
-            {"kind": kind, "paradigm": name, "offset_mm": 1e3 * offset},
-            TaskSettings(paradigm, detection_error=(offset, 0.0, 0.0)),
-            draw_operators(kind, operators, seed),
-        )
-        for kind in KINDS
-        for name, paradigm in PARADIGMS.items()
-        for offset in offsets
-    )
-    return sweep(cases, (seed, 4), time_limit=120.0, **run)
+
+    def case(kind: str, paradigm: str, offset_mm: float) -> Case:
+        settings = TaskSettings(PARADIGMS[paradigm], detection_error=(offset_mm / 1e3, 0.0, 0.0))
+        return settings, draw_operators(kind, operators, seed)
+
+    run = {"time_limit": 120.0, **run}
+    millimetres = [1e3 * offset for offset in offsets]
+    return sweep(case, (seed, 4), 1, run, kind=KINDS, paradigm=PARADIGMS, offset_mm=millimetres)
 
 
 def tracking_noise_effect(operators: int, seed: int, noises: Sequence[float], **run: Any) -> pd.DataFrame:
@@ -128,16 +132,14 @@ def tracking_noise_effect(operators: int, seed: int, noises: Sequence[float], **
         One line per trial; labels kind, counter, noise_mm, operator, trial.
     """
     real = TaskSettings(PARADIGMS["assist_as_needed"], environment="real")
-    cases = (
-        (
-            {"kind": "naive", "counter": counter, "noise_mm": 1e3 * noise},
-            replace(real, assist_as_needed={"counter": counter}, tracking_noise=noise),
-            draw_operators("naive", operators, seed),
-        )
-        for counter in ("text", "caption")
-        for noise in noises
-    )
-    return sweep(cases, (seed, 4), **run)
+
+    def case(kind: str, counter: str, noise_mm: float) -> Case:
+        settings = replace(real, assist_as_needed={"counter": counter}, tracking_noise=noise_mm / 1e3)
+        return settings, draw_operators(kind, operators, seed)
+
+    millimetres = [1e3 * noise for noise in noises]
+    counters = ("text", "caption")
+    return sweep(case, (seed, 4), 1, run, kind=["naive"], counter=counters, noise_mm=millimetres)
 
 
 def dwell_effect(operators: int, seed: int, dwells: Sequence[float], **run: Any) -> pd.DataFrame:
@@ -148,17 +150,13 @@ def dwell_effect(operators: int, seed: int, dwells: Sequence[float], **run: Any)
     pandas.DataFrame
         One line per trial; labels paradigm, attitude, dwell_s, operator, trial.
     """
-    cases = (
-        (
-            {"paradigm": name, "attitude": attitude, "dwell_s": dwell},
-            TaskSettings(PARADIGMS[name]),
-            draw_operators("naive", operators, seed, dwell=dwell, **ATTITUDES[attitude]),
-        )
-        for name in ("full_teleoperation", "assist_as_needed")
-        for attitude in ("ignore", "use")
-        for dwell in dwells
-    )
-    return sweep(cases, (seed, 4), 2, **run)
+
+    def case(paradigm: str, attitude: str, dwell_s: float) -> Case:
+        people = draw_operators("naive", operators, seed, dwell=dwell_s, **ATTITUDES[attitude])
+        return TaskSettings(PARADIGMS[paradigm]), people
+
+    paradigms = ("full_teleoperation", "assist_as_needed")
+    return sweep(case, (seed, 4), 2, run, paradigm=paradigms, attitude=("ignore", "use"), dwell_s=dwells)
 
 
 def lift_effect(operators: int, seed: int, **run: Any) -> pd.DataFrame:
@@ -175,12 +173,11 @@ def lift_effect(operators: int, seed: int, **run: Any) -> pd.DataFrame:
         "MSAE": TaskSettings(PARADIGMS["msae"]),
         "ASME": TaskSettings(PARADIGMS["asme"]),
     }
-    cases = (
-        ({"kind": kind, "case": case}, settings, draw_operators(kind, operators, seed))
-        for kind in KINDS
-        for case, settings in tasks.items()
-    )
-    return sweep(cases, (seed, 4), 2, **run)
+
+    def chosen(kind: str, case: str) -> Case:
+        return tasks[case], draw_operators(kind, operators, seed)
+
+    return sweep(chosen, (seed, 4), 2, run, kind=KINDS, case=tasks)
 
 
 def passivity_effect(seed: int, passivities: Sequence[float], repetitions: int, **run: Any) -> pd.DataFrame:
@@ -280,8 +277,12 @@ def sensitivity(count: int, seed: int, trials: int = 2, **run: Any) -> tuple[pd.
         One line per conclusion: share of operators for whom it holds, with a 95 % interval (normal).
     """
     people = draw_anyone(count, seed)
-    cases = (({"paradigm": name}, TaskSettings(paradigm), people) for name, paradigm in PARADIGMS.items())
-    results = margins(sweep(cases, (seed, 6), trials, time_limit=120.0, **run))
+
+    def case(paradigm: str) -> Case:
+        return TaskSettings(PARADIGMS[paradigm]), people
+
+    run = {"time_limit": 120.0, **run}
+    results = margins(sweep(case, (seed, 6), trials, run, paradigm=PARADIGMS))
     correlations = pd.DataFrame(index=list(RANGES), columns=results.columns, dtype=float)
     for name in RANGES:
         values = [getattr(person, name) for person in people]
@@ -304,11 +305,7 @@ AXES = {"x": DEVICE_SCALE[0], "z": DEVICE_SCALE[2]}
 """Scale of steering and eversion [-]."""
 
 
-def critical_stiffness(
-    hand_stiffness: float,
-    delay: float = 0.0,
-    scale: float = DEVICE_SCALE[2],
-) -> float:
+def critical_stiffness(hand_stiffness: float, delay: float = 0.0, scale: float = DEVICE_SCALE[2]) -> float:
     """Guidance stiffness at which the passive hand starts to oscillate [N/m].
 
     The loop k G e^(-s tau) / ((m s^2 + b s + k_h) (T s + 1)) is cut where its phase is -180 degrees; m and b

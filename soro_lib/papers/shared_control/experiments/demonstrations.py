@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from soro_lib.checks import one_of
 from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.papers.shared_control.experiments.simulation import TrialPlan, person_plans, simulate
 from soro_lib.papers.shared_control.experiments.task import TaskSettings
@@ -40,8 +41,7 @@ def draw_operators(kind: str, count: int, seed: int, **changes: float) -> list[O
     ValueError
         If there is no such kind, or a parameter is out of bounds.
     """
-    if kind not in POPULATIONS:
-        raise ValueError(f"kind must be one of {tuple(POPULATIONS)}, got {kind!r}")
+    one_of("kind", kind, POPULATIONS)
     streams = (np.random.default_rng([seed, 1, KINDS.index(kind), person]) for person in range(count))
     return [replace(POPULATIONS[kind].draw(rng), **changes) for rng in streams]
 

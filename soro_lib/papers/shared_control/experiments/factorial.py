@@ -18,6 +18,7 @@ from scipy.stats import f as f_distribution
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import AnovaRM, anova_lm
 
+from soro_lib.checks import one_of
 from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.papers.shared_control.experiments.simulation import TrialPlan, person_plans, simulate
 from soro_lib.papers.shared_control.experiments.task import TaskSettings
@@ -49,8 +50,7 @@ def stiffness_rate(delta: float, k_max: float, reading: DeltaReading) -> float:
         If the reading has no such name.
     """
     rates = {"seconds": k_max / delta, "per_second": delta, "per_sample": 100.0 * delta}
-    if reading not in rates:
-        raise ValueError(f"reading must be one of {tuple(rates)}, got {reading!r}")
+    one_of("reading", reading, rates)
     return rates[reading]
 
 

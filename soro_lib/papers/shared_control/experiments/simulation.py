@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from soro_lib.checks import positive
 from soro_lib.controllers.shared_control.guidance import distance_to_goal
 from soro_lib.jit import inlined
 from soro_lib.papers.shared_control.experiments.finished_chunks import chunk_path, read_chunk, write_chunk
@@ -235,10 +236,8 @@ def simulate(
     ValueError
         If the time limit is not positive, the chunk holds no trial, or a plan is out of bounds.
     """
-    if not time_limit > 0:
-        raise ValueError(f"time_limit must be above 0, got {time_limit!r}")
-    if chunk < 1:
-        raise ValueError(f"chunk must be at least 1, got {chunk!r}")
+    positive("time_limit", time_limit)
+    positive("chunk", chunk)
     labels: dict[str, list[Any]] = {}
     places: list[Path | None] = []
     metrics = array("d")

@@ -13,7 +13,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import Vector, vector
+from soro_lib.checks import Vector, numbers, one_of, vector
+from soro_lib.controllers.shared_control import goal_selection
 from soro_lib.controllers.shared_control.assist_as_needed import (
     ASSIST_START,
     MOTIONS,
@@ -29,36 +30,13 @@ from soro_lib.controllers.shared_control.fixed_assistance import (
     FixedState,
     fixed_step,
 )
-from soro_lib.controllers.shared_control.goal_selection import (
-    END,
-    LIFTING_EMPTY,
-    PHASES,
-    PLACING,
-    GoalRule,
-    GoalSelection,
-    GoalState,
-    goal_step,
-)
+from soro_lib.controllers.shared_control.goal_selection import END, LIFTING_EMPTY, PLACING
 from soro_lib.controllers.shared_control.guidance import distance_to_goal, guidance_force, hooke_magnitude
 from soro_lib.controllers.shared_control.paradigms import ASSISTANCES, PARADIGMS, Paradigm, desired_position
 from soro_lib.jit import inlined
+from soro_lib.papers.shared_control.world import plant as arm
 from soro_lib.papers.shared_control.world.loop import View
 from soro_lib.papers.shared_control.world.people import SAMPLE_TIME
-from soro_lib.papers.shared_control.world.plant import (
-    NOTHING,
-    REAL_GRIPPER,
-    SIMULATED_GRIPPER,
-    GripperRule,
-    GripperState,
-    PlantParameters,
-    PlantState,
-    gripper_step,
-    plant_start,
-    plant_step,
-    real_arm,
-    simulated_tip,
-    tracked_tip,
-)
 from soro_lib.papers.shared_control.world.vectors import ZERO, delay_line, difference, row, size
 
 UNASSISTED, AS_NEEDED, FIXED = range(len(ASSISTANCES))
@@ -121,10 +99,8 @@ class TaskSettings:
     tracking_noise: float | None = None
 
     def __post_init__(self) -> None:
-        if self.environment not in ("simulated", "real"):
-            raise ValueError(f'environment must be "simulated" or "real", got {self.environment!r}')
-        if self.force_law not in ("printed", "program"):
-            raise ValueError(f'force_law must be "printed" or "program", got {self.force_law!r}')
+        one_of("environment", self.environment, ("simulated", "real"))
+        one_of("force_law", self.force_law, ("printed", "program"))
 
     def rule(self) -> "TaskRule":
         """Plain numbers for the compiled rules.
@@ -140,9 +116,9 @@ class TaskSettings:
         assist = AssistAsNeeded(**{**as_needed, **self.assist_as_needed})  # type: ignore[arg-type]
         spring = FixedAssistance(**fixed)
         real = self.environment == "real"
-        plant = real_arm(self.tracking_noise) if real else PlantParameters()
+        plant = arm.real_arm(self.tracking_noise) if real else arm.PlantParameters()
         error = np.array(vector("detection_error", self.detection_error))
-        goals = GoalSelection(
+        goals = goal_selection.GoalSelection(
             np.array(self.scene.items) + error,
             np.array(self.scene.targets) + error,
             lift=self.paradigm.lifts if self.lift is None else self.lift,
@@ -157,7 +133,7 @@ class TaskSettings:
             fixed=spring.rule,
             window=len(spring.window),
             plant=plant.rule(),
-            gripper=REAL_GRIPPER if real else SIMULATED_GRIPPER,
+            gripper=arm.REAL_GRIPPER if real else arm.SIMULATED_GRIPPER,
             assistance=ASSISTANCES.index(self.paradigm.assistance),
             automation=vector("automation", self.paradigm.automation),
             unit_direction=not program,
@@ -168,15 +144,15 @@ class TaskSettings:
 class TaskRule(NamedTuple):
     """What stays fixed during a trial; ``goals`` are as detected, ``items`` and ``targets`` as they are."""
 
-    goals: GoalRule
+    goals: goal_selection.GoalRule
     items: tuple[Vector, ...]
     targets: tuple[Vector, ...]
     assist: AssistRule
     assist_maximum: float
     fixed: FixedRule
     window: int
-    plant: PlantParameters
-    gripper: GripperRule
+    plant: arm.PlantParameters
+    gripper: arm.GripperRule
     assistance: int
     automation: Vector
     unit_direction: bool
@@ -212,11 +188,11 @@ class TaskState(NamedTuple):
     """A trial between two samples."""
 
     sample: int
-    goal: GoalState
+    goal: goal_selection.GoalState
     assist: AssistState
     fixed: FixedState
-    plant: PlantState
-    gripper: GripperState
+    plant: arm.PlantState
+    gripper: arm.GripperState
     automatic: Vector
     desired: Vector
     force: Vector
@@ -240,11 +216,11 @@ def task_start(rule: TaskRule, start: Vector) -> TaskState:
     first = rule.goals.items[0]
     return TaskState(
         sample=0,
-        goal=GoalState(0, 0, first, first),
+        goal=goal_selection.GoalState(0, 0, first, first),
         assist=ASSIST_START,
         fixed=FIXED_START,
-        plant=plant_start(start),
-        gripper=GripperState(NOTHING, -1.0),
+        plant=arm.plant_start(start),
+        gripper=arm.GripperState(arm.NOTHING, -1.0),
         automatic=start,
         desired=start,
         force=ZERO,
@@ -266,10 +242,10 @@ def horizontal(a: Vector, b: Vector) -> float:
 @inlined
 def carry(rule: TaskRule, items: NDArray[np.float64], before: int, after: int, tip: Vector) -> None:
     """Move the held item with the tip; a released one falls straight down to where it lay."""
-    moved = after if after != NOTHING else before
-    if moved != NOTHING:
+    moved = after if after != arm.NOTHING else before
+    if moved != arm.NOTHING:
         items[moved, 0], items[moved, 1] = tip[0], tip[1]
-        items[moved, 2] = tip[2] if after != NOTHING else rule.items[moved][2]
+        items[moved, 2] = tip[2] if after != arm.NOTHING else rule.items[moved][2]
 
 
 @inlined
@@ -307,30 +283,30 @@ def task_step(
     ``closed``: the gripper's button is held. ``confirmed``: the operator reports an item in the gripper (the
     second button); heeded by the real variant, which cannot sense it.
     """
-    automatic = simulated_tip(state.automatic, state.goal.goal, AUTOMATIC_LAG)
+    automatic = arm.simulated_tip(state.automatic, state.goal.goal, AUTOMATIC_LAG)
     desired = desired_position(command, automatic, rule.automation)
-    plant = plant_step(rule.plant, state.plant, memory.delayed, desired)
+    plant = arm.plant_step(rule.plant, state.plant, memory.delayed, desired)
     tip = plant.tip
     time = SAMPLE_TIME * (state.sample + 1)
 
     opening_error = state.tally.opening_error
     item = state.gripper.item
-    if item != NOTHING and state.closed and not closed:
+    if item != arm.NOTHING and state.closed and not closed:
         opening_error = horizontal(tip, rule.targets[item])
     gripper = state.gripper
-    if closed or item != NOTHING:
-        gripper = gripper_step(rule.gripper, gripper, memory.items, tip, desired, closed, rng)
+    if closed or item != arm.NOTHING:
+        gripper = arm.gripper_step(rule.gripper, gripper, memory.items, tip, desired, closed, rng)
         carry(rule, memory.items, item, gripper.item, tip)
-    if item == NOTHING and gripper.item != NOTHING:
+    if item == arm.NOTHING and gripper.item != arm.NOTHING:
         memory.releases[gripper.item, 3] = time
-    elif item != NOTHING and gripper.item == NOTHING and state.goal.phase == PLACING:
+    elif item != arm.NOTHING and gripper.item == arm.NOTHING and state.goal.phase == PLACING:
         memory.releases[item, 0] = time
         memory.releases[item, 1] = opening_error
         memory.releases[item, 2] = horizontal(tip, rule.targets[item])
 
-    tracked = tracked_tip(tip, rule.plant.tracking_noise, rng)
-    held = confirmed if rule.confirmed_by_hand else gripper.item != NOTHING
-    goal = goal_step(rule.goals, state.goal, tracked, held)
+    tracked = arm.tracked_tip(tip, rule.plant.tracking_noise, rng)
+    held = confirmed if rule.confirmed_by_hand else gripper.item != arm.NOTHING
+    goal = goal_selection.goal_step(rule.goals, state.goal, tracked, held)
     assisted, fixed, magnitude, force = state.assist, state.fixed, 0.0, ZERO
     if rule.assistance != UNASSISTED:
         assisted, fixed, magnitude, force = assist(rule, assisted, fixed, memory.window, tracked, goal.goal)
@@ -368,7 +344,7 @@ def delivered(rule: TaskRule, state: TaskState) -> bool:
 @inlined
 def operator_view(rule: TaskRule, state: TaskState, items: NDArray[np.float64]) -> View:
     """What an operator sees and feels. Wanted: the target of the item in the gripper, else the next item."""
-    held = state.gripper.item != NOTHING
+    held = state.gripper.item != arm.NOTHING
     if held:
         wanted = rule.targets[state.gripper.item]
     else:
@@ -472,25 +448,15 @@ class Trial:
         ValueError
             If the command has not three components.
         """
-        given = np.asarray(command, dtype=float)
-        if given.shape != (3,):
-            raise ValueError(f"command must have shape (3,), got {given.shape}")
+        given = numbers("command", command, (3,))
         good = bool(np.all(np.isfinite(given)))
         if good:
             self.command = vector("command", given)
-        holding = self.state.gripper.item != NOTHING
+        holding = self.state.gripper.item != arm.NOTHING
         confirmed = holding if confirm is None else bool(confirm)
         self.state = task_step(
             self.rule, self.state, self.memory, self.command, bool(gripper_closed), confirmed, self.rng
         )
-        return self._sample(not good)
-
-    @property
-    def done(self) -> bool:
-        """Whether the last item has been placed."""
-        return delivered(self.rule, self.state)
-
-    def _sample(self, held_command: bool) -> Sample:
         state = self.state
         stiffness = {AS_NEEDED: state.assist.stiffness, FIXED: self.rule.fixed.stiffness}
         return Sample(
@@ -502,9 +468,14 @@ class Trial:
             stiffness=stiffness.get(self.rule.assistance, 0.0),
             magnitude=state.magnitude,
             motion=MOTIONS[state.assist.motion],
-            phase=PHASES[state.goal.phase],
+            phase=goal_selection.PHASES[state.goal.phase],
             item=state.gripper.item,
             items=self.memory.items.copy(),
             done=self.done,
-            held_command=held_command,
+            held_command=not good,
         )
+
+    @property
+    def done(self) -> bool:
+        """Whether the last item has been placed."""
+        return delivered(self.rule, self.state)

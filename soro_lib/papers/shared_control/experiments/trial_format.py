@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from soro_lib.checks import positive, vector
+from soro_lib.checks import one_of, positive, vector
 from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.controllers.shared_control.assist_as_needed import MOTIONS
 from soro_lib.controllers.shared_control.goal_selection import PHASES, goal_points
@@ -131,10 +131,8 @@ class TrialHeader:
     scene: Scene = field(default_factory=Scene)
 
     def __post_init__(self) -> None:
-        if self.paradigm not in PARADIGMS:
-            raise ValueError(f"paradigm must be one of {', '.join(PARADIGMS)}, got {self.paradigm!r}")
-        if self.view not in VIEWS:
-            raise ValueError(f"view must be one of {', '.join(VIEWS)}, got {self.view!r}")
+        one_of("paradigm", self.paradigm, PARADIGMS)
+        one_of("view", self.view, VIEWS)
         positive("hand_stiffness_n_per_m", self.hand_stiffness)
         for name in ("operator", "kind"):
             if not getattr(self, name):

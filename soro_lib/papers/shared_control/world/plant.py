@@ -8,17 +8,15 @@ Source: Stroppa et al., Sections 3.1, 3.2 and supplement, Sections 4 and 5.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import Vector, vector
+from soro_lib.checks import Vector, check_fields, number, vector
 from soro_lib.jit import inlined
-from soro_lib.papers.shared_control.world.people import POSITIVE, SAMPLE_TIME, check_fields
+from soro_lib.papers.shared_control.world.people import SAMPLE_TIME
 from soro_lib.papers.shared_control.world.vectors import (
     delay_line,
     difference,
@@ -103,10 +101,10 @@ class PlantParameters:
     tracking_noise: float = 0.0
 
     def __post_init__(self) -> None:
-        check_fields(self, BOUNDS)
-        if self.minimum_length >= self.maximum_length:
-            bound = f"maximum_length = {self.maximum_length} m"
-            raise ValueError(f"minimum_length must be below {bound}, got {self.minimum_length}")
+        check_fields(self, at_least=0, at_most=math.inf)
+        check_fields(self, *ABOVE_ZERO, above=0, at_most=math.inf)
+        check_fields(self, "maximum_tilt", below=math.pi / 2)
+        number("minimum_length", self.minimum_length, below=self.maximum_length)
 
     def rule(self) -> Any:
         """The same fields as a named tuple, which the compiled rules can take; command delay in samples."""
@@ -117,13 +115,8 @@ class PlantParameters:
 
 ABOVE_ZERO = (
     *("tip_lag", "steering_gain", "steering_lag", "eversion_gain", "eversion_lag"),
-    *("maximum_speed", "minimum_length", "maximum_length", "floor"),
+    *("maximum_speed", "maximum_tilt", "minimum_length", "maximum_length", "floor"),
 )
-BOUNDS: Mapping[str, pd.Interval] = {
-    **dict.fromkeys(ABOVE_ZERO, POSITIVE),
-    "maximum_tilt": pd.Interval(0.0, math.pi / 2, closed="neither"),
-}
-
 PlantRule: Any = NamedTuple("PlantRule", [(field.name, float) for field in fields(PlantParameters)])  # type: ignore[misc]
 
 

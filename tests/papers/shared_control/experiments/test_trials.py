@@ -155,7 +155,7 @@ BAD_FILES = {
     ),
     "paradigm": (
         lambda lines: set_header(lines, "paradigm", '"telepathy"'),
-        r"0006\S+: paradigm must be one of full_teleoperation, .*got 'telepathy'",
+        r"0006\S+: paradigm must be one of 'full_teleoperation', .*got 'telepathy'",
     ),
     "environment": (
         lambda lines: set_header(lines, "environment", '"imagined"'),
@@ -163,7 +163,7 @@ BAD_FILES = {
     ),
     "view": (
         lambda lines: set_header(lines, "view", '"mirror"'),
-        "view must be one of above and front, camera",
+        "view must be one of 'above and front', 'camera'",
     ),
     "law": (lambda lines: set_header(lines, "force_law", '"third"'), "force_law must be"),
     "no paradigm": (
