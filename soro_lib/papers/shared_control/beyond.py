@@ -17,15 +17,7 @@ from scipy.stats import qmc, spearmanr
 
 from soro_lib.checks import not_negative, positive
 from soro_lib.controllers.shared_control import PARADIGMS, Paradigm
-from soro_lib.papers.shared_control.experiments.claims import (
-    AAN,
-    ASME,
-    AUTO,
-    FIXED,
-    FULL,
-    MSAE,
-    operator_means,
-)
+from soro_lib.papers.shared_control.experiments.claims import operator_means
 from soro_lib.papers.shared_control.experiments.demonstrations import KINDS, draw_operators
 from soro_lib.papers.shared_control.experiments.factorial import CONTRASTS, contrast_samples, run_factorial
 from soro_lib.papers.shared_control.experiments.simulation import TrialPlan, person_plans, simulate
@@ -239,19 +231,20 @@ def margins(trials: pd.DataFrame) -> pd.DataFrame:
     """How clearly each conclusion holds for each operator: logarithms of ratios, positive where it holds."""
     means = operator_means(trials)
     time, error, force = np.log(means["time_s"]), np.log(means["release_error_mm"]), means["assistance_n"]
-    others = [FULL, AAN, FIXED, MSAE, ASME]
+    full, aan, fixed, msae, asme, auto = PARADIGMS
+    others = [full, aan, fixed, msae, asme]
     return pd.DataFrame(
         {
-            "Auto shortest": time[others].min(axis=1) - time[AUTO],
-            "Auto most accurate": error[others].min(axis=1) - error[AUTO],
-            "ASME shorter than MSAE": time[MSAE] - time[ASME],
-            "ASME more accurate": error[MSAE] - error[ASME],
-            "MSAE shorter than Full": time[FULL] - time[MSAE],
-            "AAN shorter than Full": time[FULL] - time[AAN],
-            "AAN more accurate": error[FULL] - error[AAN],
-            "AAN shorter than Fixed": time[FIXED] - time[AAN],
-            "Fixed slower than MSAE": time[FIXED] - time[MSAE],
-            "Force of AAN": force[AAN],
+            "Auto shortest": time[others].min(axis=1) - time[auto],
+            "Auto most accurate": error[others].min(axis=1) - error[auto],
+            "ASME shorter than MSAE": time[msae] - time[asme],
+            "ASME more accurate": error[msae] - error[asme],
+            "MSAE shorter than Full": time[full] - time[msae],
+            "AAN shorter than Full": time[full] - time[aan],
+            "AAN more accurate": error[full] - error[aan],
+            "AAN shorter than Fixed": time[fixed] - time[aan],
+            "Fixed slower than MSAE": time[fixed] - time[msae],
+            "Force of AAN": force[aan],
         }
     )
 

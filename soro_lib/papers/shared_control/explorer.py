@@ -26,7 +26,7 @@ from soro_lib.papers.shared_control.experiments import recorder
 from soro_lib.papers.shared_control.experiments.simulation import METRICS, TIME_LIMIT, trial_metrics
 from soro_lib.papers.shared_control.experiments.trial_format import VIEWS, TrialHeader
 from soro_lib.papers.shared_control.experiments.trials import load_trials
-from soro_lib.papers.shared_control.figures.trials import fig02_task
+from soro_lib.papers.shared_control.figures.paper import fig02_task
 from soro_lib.papers.shared_control.world.hand import felt_force
 from soro_lib.papers.shared_control.world.people import DEVICE_SCALE, EXPERT
 from soro_lib.papers.shared_control.world.plant import NOTHING, SAMPLE_TIME, nearest_item

@@ -7,18 +7,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from soro_lib.controllers.shared_control import PARADIGMS, AssistAsNeeded, FixedAssistance
+from soro_lib.papers.shared_control.experiments import factorial
 from soro_lib.papers.shared_control.experiments.claims import evaluate_claims
 from soro_lib.papers.shared_control.experiments.demonstrations import TRIALS
-from soro_lib.papers.shared_control.experiments.factorial import (
-    CONTRASTS,
-    FACTORS,
-    Contrast,
-    blocked_f,
-    contrast_samples,
-    interaction_samples,
-    printed_p_value,
-    repeated_measures_anova,
-)
 from soro_lib.papers.shared_control.experiments.task import Scene
 from soro_lib.papers.shared_control.world.plant import TRACKING_RATE
 from soro_lib.replication.findings import Finding
@@ -80,13 +71,13 @@ def definitions() -> dict[str, Finding]:
         "table3_xi_c": aan.rule.approach_delay / aan.sample_rate,
         "table3_xi_a": aan.rule.away_delay / aan.sample_rate,
         "table3_k_max": aan.rule.maximum_stiffness,
-        "factorial_settings": 2 ** len(FACTORS),
-        "factorial_trials": 3 * 2 ** len(FACTORS),
+        "factorial_settings": 2 ** len(factorial.FACTORS),
+        "factorial_trials": 3 * 2 ** len(factorial.FACTORS),
         "demonstration_trials": TRIALS * len(PARADIGMS),
         "redistribution": REDISTRIBUTION,
         "tracking_rate": TRACKING_RATE,
     }
-    for name, (low, high) in FACTORS.items():
+    for name, (low, high) in factorial.FACTORS.items():
         values |= {f"table2_{name}_low": low, f"table2_{name}_high": high}
     depth = "centres of the items in the authors' simulator; its table lies at 670 mm"
     distance = "the authors' simulator has 57 and 58 cm; 30 cm is the distance of the items"
@@ -98,7 +89,7 @@ def definitions() -> dict[str, Finding]:
 
 def printed_p_values() -> dict[str, Finding]:
     """The p that belong to the printed F(1, 2): they match only with two error degrees of freedom."""
-    p = {name: printed_p_value(f) for name, f in PRINTED_F.items()}
+    p = {name: factorial.printed_p_value(f) for name, f in PRINTED_F.items()}
     below = {name: Finding(p.pop(name) < 0.01) for name in ("fmax_time", "xi_s_path")}
     return {f"p_{name}": Finding(value) for name, value in p.items()} | {
         f"p_{name}_below": finding for name, finding in below.items()
@@ -108,21 +99,21 @@ def printed_p_values() -> dict[str, Finding]:
 def factorial_findings(trials: pd.DataFrame) -> dict[str, Finding]:
     """Effects, F and signs of the tuning study; a sample per operator."""
     findings = {}
-    for contrast in CONTRASTS:
-        samples = contrast_samples(trials, contrast)
+    for contrast in factorial.CONTRASTS:
+        samples = factorial.contrast_samples(trials, contrast)
         effect = samples.mean(axis=1)
         why, against = IMPOSSIBLE if contrast.name == "kmax_assistance" else (ACTIVE, ACTIVE)
         findings[f"effect_{contrast.name}"] = Finding(effect, why)
-        findings[f"f_{contrast.name}"] = Finding(blocked_f(samples), SCATTER, "median")
+        findings[f"f_{contrast.name}"] = Finding(factorial.blocked_f(samples), SCATTER, "median")
         findings[f"sign_{contrast.name}"] = Finding(np.sign(effect) == contrast.sign, against)
-    interaction = interaction_samples(trials, "assistance_n", "xi_c", "xi_s")
-    findings["f_interaction"] = Finding(blocked_f(interaction), SCATTER, "median")
+    interaction = factorial.interaction_samples(trials, "assistance_n", "xi_c", "xi_s")
+    findings["f_interaction"] = Finding(factorial.blocked_f(interaction), SCATTER, "median")
     findings["sign_interaction"] = Finding(_largest_assistance(trials))
     findings["sign_error_insensitive"] = Finding(
         _error_insensitive(trials), "six tests at 5 % pass together in 74 % of studies by chance alone"
     )
     first = trials[trials["operator"] == 0]
-    anova = repeated_measures_anova(first, "time_s")
+    anova = factorial.repeated_measures_anova(first, "time_s")
     return findings | {"error_df": Finding(anova["df_error"].iloc[0])}
 
 
@@ -134,8 +125,10 @@ def _largest_assistance(trials: pd.DataFrame) -> NDArray[np.bool_]:
 
 def _error_insensitive(trials: pd.DataFrame) -> NDArray[np.bool_]:
     """Whether no main effect on the placement error is significant, for each operator."""
-    mains = [Contrast(name, "placement_error_mm", {name: 1}, {name: 0}, 1.0) for name in FACTORS]
-    p = [[printed_p_value(f) for f in blocked_f(contrast_samples(trials, main))] for main in mains]
+    p = []
+    for name in factorial.FACTORS:
+        main = factorial.Contrast(name, "placement_error_mm", {name: 1}, {name: 0}, 1.0)
+        p.append(factorial.printed_p_value(factorial.blocked_f(factorial.contrast_samples(trials, main))))
     return np.all(np.array(p) >= 0.05, axis=0)
 
 
@@ -148,19 +141,19 @@ def claim_findings(demonstrations: pd.DataFrame) -> dict[str, Finding]:
     }
 
 
-def findings(demonstrations: pd.DataFrame, factorial: pd.DataFrame) -> dict[str, Finding]:
+def findings(demonstrations: pd.DataFrame, tuning: pd.DataFrame) -> dict[str, Finding]:
     """All findings, keyed by the published row.
 
     Parameters
     ----------
     demonstrations : pandas.DataFrame
         Of `run_demonstrations`: both kinds, both environments.
-    factorial : pandas.DataFrame
+    tuning : pandas.DataFrame
         Of `run_factorial`, several operators, three repetitions each.
     """
     return {
         **definitions(),
         **printed_p_values(),
-        **factorial_findings(factorial),
+        **factorial_findings(tuning),
         **claim_findings(demonstrations),
     }

@@ -30,7 +30,6 @@ from soro_lib.papers.shared_control.experiments.task import (
     TaskState,
     delivered,
     operator_view,
-    task_memory,
     task_start,
     task_step,
 )
@@ -165,11 +164,11 @@ def play_trial(
     """
     rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(plan.seed)))
     start = plan.settings.scene.start
-    memory = task_memory(rule, plan.settings.scene)
+    first, memory = task_start(rule, start)
     operator = plan.operator.rule()
     human, pictures = operator_start(start), picture_buffer(operator, start)
     run = _compiled_play if compiled else play
-    state = run(rule, task_start(rule, start), memory, operator, human, pictures, rng, samples, trace)
+    state = run(rule, first, memory, operator, human, pictures, rng, samples, trace)
     return state, memory
 
 

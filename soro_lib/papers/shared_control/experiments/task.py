@@ -163,10 +163,10 @@ class TaskRule(NamedTuple):
 
 
 class TaskMemory(NamedTuple):
-    """Arrays that a trial overwrites: filter window, commands on their way, items (n, 3), releases (n, 4).
+    """Arrays that a trial overwrites: filter window, commands on their way, items (n, 3), releases (n, 2).
 
-    A row of ``releases`` holds time [s], distance of the tip from its target when the gripper was opened and
-    of the item from its target when it fell [m] (both horizontal), and time of the grasp [s].
+    A row of ``releases`` holds the time at which an item fell [s] and the horizontal distance of the tip from
+    its target when the gripper was opened [m].
     """
 
     window: NDArray[np.float64]
@@ -201,20 +201,12 @@ class TaskState(NamedTuple):
     tally: Tally
 
 
-def task_memory(rule: TaskRule, scene: Scene) -> TaskMemory:
-    """Fresh arrays for one trial."""
-    return TaskMemory(
-        window=np.zeros(rule.window),
-        delayed=delay_line(scene.start, rule.plant.command_delay),
-        items=np.array(scene.items, dtype=float),
-        releases=np.full((len(scene.items), 4), np.nan),
-    )
-
-
-def task_start(rule: TaskRule, start: Vector) -> TaskState:
+def task_start(rule: TaskRule, start: Vector) -> tuple[TaskState, TaskMemory]:
     """A trial before its first sample: tip at rest, gripper open, no force."""
-    first = rule.goals.items[0]
-    return TaskState(
+    items, first = np.array(rule.items, dtype=float), rule.goals.items[0]
+    delayed = delay_line(start, rule.plant.command_delay)
+    memory = TaskMemory(np.zeros(rule.window), delayed, items, np.full((len(items), 2), np.nan))
+    state = TaskState(
         sample=0,
         goal=goal_selection.GoalState(0, 0, first, first),
         assist=ASSIST_START,
@@ -228,15 +220,10 @@ def task_start(rule: TaskRule, start: Vector) -> TaskState:
         closed=False,
         tally=Tally(0.0, 0.0, 0.0, math.nan),
     )
+    return state, memory
 
 
 # --- One sample ----------------------------------------------------------------------------------------
-
-
-@inlined
-def horizontal(a: Vector, b: Vector) -> float:
-    """Distance of two points in the x-y plane [m]."""
-    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2)
 
 
 @inlined
@@ -250,14 +237,12 @@ def carry(rule: TaskRule, items: NDArray[np.float64], before: int, after: int, t
 
 @inlined
 def assist(
-    rule: TaskRule,
-    assisted: AssistState,
-    fixed: FixedState,
-    window: NDArray[np.float64],
-    tip: Vector,
-    goal: Vector,
+    rule: TaskRule, state: TaskState, window: NDArray[np.float64], tip: Vector, goal: Vector
 ) -> tuple[AssistState, FixedState, float, Vector]:
     """The assistance of the paradigm: its states, |f| and the rendered force [N]."""
+    assisted, fixed = state.assist, state.fixed
+    if rule.assistance == UNASSISTED:
+        return assisted, fixed, 0.0, ZERO
     distance = distance_to_goal(tip, goal)
     if rule.assistance == AS_NEEDED:
         assisted = assist_step(rule.assist, assisted, distance, 1.0)
@@ -287,29 +272,24 @@ def task_step(
     desired = desired_position(command, automatic, rule.automation)
     plant = arm.plant_step(rule.plant, state.plant, memory.delayed, desired)
     tip = plant.tip
-    time = SAMPLE_TIME * (state.sample + 1)
 
     opening_error = state.tally.opening_error
     item = state.gripper.item
     if item != arm.NOTHING and state.closed and not closed:
-        opening_error = horizontal(tip, rule.targets[item])
+        off = difference(tip, rule.targets[item])
+        opening_error = size((off[0], off[1], 0.0))
     gripper = state.gripper
     if closed or item != arm.NOTHING:
         gripper = arm.gripper_step(rule.gripper, gripper, memory.items, tip, desired, closed, rng)
         carry(rule, memory.items, item, gripper.item, tip)
-    if item == arm.NOTHING and gripper.item != arm.NOTHING:
-        memory.releases[gripper.item, 3] = time
-    elif item != arm.NOTHING and gripper.item == arm.NOTHING and state.goal.phase == PLACING:
-        memory.releases[item, 0] = time
+    if item != arm.NOTHING and gripper.item == arm.NOTHING and state.goal.phase == PLACING:
+        memory.releases[item, 0] = SAMPLE_TIME * (state.sample + 1)
         memory.releases[item, 1] = opening_error
-        memory.releases[item, 2] = horizontal(tip, rule.targets[item])
 
     tracked = arm.tracked_tip(tip, rule.plant.tracking_noise, rng)
     held = confirmed if rule.confirmed_by_hand else gripper.item != arm.NOTHING
     goal = goal_selection.goal_step(rule.goals, state.goal, tracked, held)
-    assisted, fixed, magnitude, force = state.assist, state.fixed, 0.0, ZERO
-    if rule.assistance != UNASSISTED:
-        assisted, fixed, magnitude, force = assist(rule, assisted, fixed, memory.window, tracked, goal.goal)
+    assisted, fixed, magnitude, force = assist(rule, state, memory.window, tracked, goal.goal)
 
     newton = size(force)
     tally = Tally(
@@ -422,8 +402,7 @@ class Trial:
         self.settings = settings
         self.rng = rng
         self.rule = settings.rule()
-        self.memory = task_memory(self.rule, settings.scene)
-        self.state = task_start(self.rule, settings.scene.start)
+        self.state, self.memory = task_start(self.rule, settings.scene.start)
         self.command: Vector = settings.scene.start
 
     def step(self, command: ArrayLike, gripper_closed: bool, confirm: bool | None = None) -> Sample:

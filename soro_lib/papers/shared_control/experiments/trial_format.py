@@ -36,7 +36,7 @@ SUFFIXES = (".csv", ".csv.gz", ".csv.part")
 MAXIMUM_ROWS = 360_000
 """Samples read at most: an hour at 100 Hz."""
 
-LARGEST = {"m": 5.0, "n": 100.0, "n_per_m": 10_000.0}
+LARGEST = {"m": 5.0, "N": 100.0, "N/m": 10_000.0}
 """Largest value believed, by unit: more is a file in other units."""
 
 HEADER = {
@@ -67,11 +67,6 @@ def _axes(name: str, unit: str, meaning: str) -> dict[str, str]:
 def unit_of(meaning: str) -> str:
     """The unit with which the meaning of a column begins, "N/m" of "[N/m] stiffness"."""
     return meaning[1:].partition("]")[0]
-
-
-def suffix_of(unit: str) -> str:
-    """How the names of columns in a unit end: "n_per_m" for "N/m"."""
-    return unit.lower().replace("/", "_per_")
 
 
 COLUMNS = {

@@ -16,25 +16,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from soro_lib.controllers.shared_control.goal_selection import END, LIFTING_EMPTY, PLACING
+from soro_lib.papers.shared_control.experiments import trial_format
 from soro_lib.papers.shared_control.experiments.metrics import (
     mean_assistance,
     placement_error,
     trajectory_length,
 )
 from soro_lib.papers.shared_control.experiments.simulation import METRICS, TRACE
-from soro_lib.papers.shared_control.experiments.trial_format import (
-    AXES,
-    COLUMNS,
-    LARGEST,
-    MAXIMUM_ROWS,
-    STATES,
-    SUFFIXES,
-    TrialError,
-    TrialHeader,
-    suffix_of,
-    trial_columns,
-    unit_of,
-)
+from soro_lib.papers.shared_control.experiments.trial_format import TrialError, TrialHeader
 
 
 @dataclass(frozen=True)
@@ -84,7 +73,7 @@ class RecordedTrial:
     def points(self, name: str) -> NDArray[np.float64]:
         """Three columns of one quantity, shape (n, 3)."""
         unit = "n" if name == "force" else "m"
-        return self.samples[[f"{name}_{axis}_{unit}" for axis in AXES]].to_numpy(dtype=float)
+        return self.samples[[f"{name}_{axis}_{unit}" for axis in trial_format.AXES]].to_numpy(dtype=float)
 
     def metrics(self) -> dict[str, float]:
         """The metrics of the study, `METRICS`, by the functions that stand for Eqs. (9)-(11)."""
@@ -175,7 +164,7 @@ def load_trials(folder: str | Path) -> list[RecordedTrial]:
     folder = Path(folder)
     if not folder.is_dir():
         raise FileNotFoundError(f"no such folder of trials: {folder}")
-    paths = sorted(path for path in folder.iterdir() if path.name.endswith(SUFFIXES))
+    paths = sorted(path for path in folder.iterdir() if path.name.endswith(trial_format.SUFFIXES))
     return [load_trial(path) for path in paths if not (path.suffix == ".part" and _is_bare(path))]
 
 
@@ -202,10 +191,11 @@ def load_trial(path: str | Path) -> RecordedTrial:
         header = TrialHeader.parse(lines[:top])
     except ValueError as error:
         raise TrialError(f"{path.name}: {error}") from None
-    if len(lines) < top + 2:
+    rows, bound = len(lines) - top - 1, trial_format.MAXIMUM_ROWS
+    if rows < 1:
         raise TrialError(f"{path.name}: no samples")
-    if len(lines) - top - 1 > MAXIMUM_ROWS:
-        raise TrialError(f"{path.name}: {len(lines) - top - 1} samples, bound {MAXIMUM_ROWS}; cut the file")
+    if rows > bound:
+        raise TrialError(f"{path.name}: {rows} samples, bound {bound}; cut the file")
     try:
         raw = pd.read_csv(io.StringIO("\n".join(lines[top:])), dtype=str, keep_default_na=False)
     except pd.errors.ParserError as error:
@@ -227,7 +217,7 @@ def _lines(path: Path) -> list[str]:
 
 def _checked(raw: pd.DataFrame, header: TrialHeader, file: str) -> pd.DataFrame:
     """The samples as numbers, every column and value checked."""
-    columns = trial_columns(len(header.scene.items))
+    columns = trial_format.trial_columns(len(header.scene.items))
     for name, meaning in columns.items():
         if name not in raw.columns:
             raise TrialError(f"{file}: {_absent(name, meaning, list(raw.columns))}")
@@ -246,29 +236,28 @@ def _checked(raw: pd.DataFrame, header: TrialHeader, file: str) -> pd.DataFrame:
         allowed = range(low, high + 1)
         _refuse(~table[name].isin(allowed), raw[name], file, f"is not a whole number from {low} to {high}")
     for name, meaning in columns.items():
-        unit = unit_of(meaning)
-        if (largest := LARGEST.get(suffix_of(unit))) is not None:
-            bound = f"is beyond {largest:g}: is it in [{unit}]?"
-            _refuse(table[name].abs() > largest, raw[name], file, bound)
+        unit = trial_format.unit_of(meaning)
+        largest = trial_format.LARGEST.get(unit, math.inf)
+        bound = f"is beyond {largest:g}: is it in [{unit}]?"
+        _refuse(table[name].abs() > largest, raw[name], file, bound)
     return table
 
 
 def _absent(name: str, meaning: str, present: list[str]) -> str:
     """What to say of a missing column: that it stands there in another unit, where it does."""
-    unit = unit_of(meaning)
-    stem = name.removesuffix("_" + suffix_of(unit))
+    unit = trial_format.unit_of(meaning)
+    stem = name.removesuffix("_" + unit.lower().replace("/", "_per_"))
     for other in present:
-        if unit != "-" and other.startswith(stem + "_") and other not in COLUMNS:
+        if unit != "-" and other.startswith(stem + "_") and other not in trial_format.COLUMNS:
             return f"column {other} has the wrong unit; {name} in [{unit}] is needed"
     return f"column {name} is missing ({meaning})"
 
 
 def _numbers(column: pd.Series, file: str) -> pd.Series:
     """A column of text as finite numbers; states by their index."""
-    name = str(column.name)
-    if name in STATES:
-        _refuse(~column.isin(STATES[name]), column, file, f"is not one of {', '.join(STATES[name])}")
-        return column.map(STATES[name].index).astype(int)
+    if states := trial_format.STATES.get(str(column.name)):
+        _refuse(~column.isin(states), column, file, f"is not one of {', '.join(states)}")
+        return column.map(states.index).astype(int)
     values = pd.to_numeric(column, errors="coerce")
     _refuse(~np.isfinite(values), column, file, "is not a finite number")
     return values.astype(float)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from soro_lib.papers.shared_control.figures.results import PARADIGM_COLORS, SHORT, THIN, number_map
+from soro_lib.papers.shared_control.figures.paper import PARADIGM_COLORS, SHORT, THIN, number_map
 from soro_lib.replication.plotting import (
     COLORS,
     REFERENCE,

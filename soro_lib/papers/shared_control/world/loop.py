@@ -6,19 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soro_lib.jit import inlined
+from soro_lib.papers.shared_control.world import vectors
 from soro_lib.papers.shared_control.world.belief import Belief, belief_error, new_belief, scaled_belief
 from soro_lib.papers.shared_control.world.decision import DECIDED_NOTHING, Decision, decide
 from soro_lib.papers.shared_control.world.hand import Hand, Movement, hand_step, intend, plan_submovement
 from soro_lib.papers.shared_control.world.people import DEVICE_SCALE, SAMPLE_TIME, Operator, Vector
-from soro_lib.papers.shared_control.world.vectors import (
-    ZERO,
-    delay_line,
-    difference,
-    moved,
-    row,
-    set_row,
-    size,
-)
 
 RESTING_SPEED = 0.02
 """Speed below which a tip looks at rest [m/s]."""
@@ -66,41 +58,41 @@ def operator_start(tip: Vector) -> OperatorState:
         think_until=0.0,
         last_held=True,
         resting=0.0,
-        belief=Belief(0.0, 0.0, 0.0, 0.0, ZERO),
-        movement=Movement(ZERO, -10.0, 1.0, rest),
-        hand=Hand(rest, ZERO, ZERO),
+        belief=Belief(0.0, 0.0, 0.0, 0.0, vectors.ZERO),
+        movement=Movement(vectors.ZERO, -10.0, 1.0, rest),
+        hand=Hand(rest, vectors.ZERO, vectors.ZERO),
         decision=DECIDED_NOTHING,
     )
 
 
 def picture_buffer(rule: Operator, tip: Vector) -> NDArray[np.float64]:
     """Ring buffer of the pictures on their way through the eye, filled with the tip at rest."""
-    return delay_line(tip, round(rule.reaction_delay / SAMPLE_TIME))
+    return vectors.delay_line(tip, round(rule.reaction_delay / SAMPLE_TIME))
 
 
 @inlined
 def delayed_picture(pictures: NDArray[np.float64], sample: int, tip: Vector) -> tuple[Vector, float]:
     """The tip one reaction delay ago [m] and its speed then [m/s]; the new picture is stored."""
     count = len(pictures)
-    seen, following = row(pictures, sample % count), row(pictures, (sample + 1) % count)
-    set_row(pictures, sample % count, tip)
-    return seen, size(difference(following, seen)) / SAMPLE_TIME if count > 1 else 0.0
+    seen, following = vectors.row(pictures, sample % count), vectors.row(pictures, (sample + 1) % count)
+    vectors.set_row(pictures, sample % count, tip)
+    return seen, vectors.size(vectors.difference(following, seen)) / SAMPLE_TIME if count > 1 else 0.0
 
 
 @inlined
 def heed_force(rule: Operator, belief: Belief, force: Vector) -> Belief:
     """Take a felt force for a hint and move the belief along it."""
     step = rule.cue_gain * SAMPLE_TIME
-    if step == 0.0 or size(force) <= rule.felt_force:
+    if step == 0.0 or vectors.size(force) <= rule.felt_force:
         return belief
-    shift = moved(belief.shift, step, force)
+    shift = vectors.moved(belief.shift, step, force)
     return Belief(belief.right, belief.up, belief.depth, belief.glance, shift)
 
 
 @inlined
 def approach_rise(rule: Operator, goal: Vector, seen: Vector) -> float:
     """How much higher to aim while the tip is horizontally far from the goal [m]."""
-    across = size((goal[0] - seen[0], goal[1] - seen[1], 0.0))
+    across = vectors.size((goal[0] - seen[0], goal[1] - seen[1], 0.0))
     share = (across - APPROACH_NEAR) / (APPROACH_FAR - APPROACH_NEAR)
     return rule.approach_height * min(max(share, 0.0), 1.0)
 
@@ -150,7 +142,7 @@ def operator_step(
         belief = Belief(belief.right, belief.up, belief.depth, glance, belief.shift)
 
     goal = believed_goal(rule, belief, view)
-    offset = size(difference(goal, seen))
+    offset = vectors.size(vectors.difference(goal, seen))
     machine = max(view.automation[0], view.automation[1], view.automation[2])
     resting = state.resting + SAMPLE_TIME if speed < RESTING_SPEED and machine > 0.0 else 0.0
     resigned = resting > rule.resignation and offset < RESIGNED_OFFSET
@@ -163,12 +155,12 @@ def operator_step(
     ready = time >= movement.start + movement.duration + pause and time >= think_until
     if ready and speed <= rule.wait_speed:
         error = seen_error(rule, view, goal, seen)
-        if size(error) > rule.tolerance:
+        if vectors.size(error) > rule.tolerance:
             movement = plan_submovement(rule, movement, error, time, rng)
 
     movement = intend(rule, movement, state.hand, time)
     hand = hand_step(rule, state.hand, movement.intention, view.force, time, rng)
-    pulled = rule.cue_gain > 0.0 and size(view.force) > rule.felt_force
+    pulled = rule.cue_gain > 0.0 and vectors.size(view.force) > rule.felt_force
     decided = decide(rule, decision, looks_right and time >= think_until, pulled, view.held)
     if decision.closed and not decided.closed and not view.held:
         belief = scaled_belief(belief, 1.0 - rule.learn)

@@ -16,16 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.checks import Vector, check_fields, number, vector
 from soro_lib.jit import inlined
+from soro_lib.papers.shared_control.world import vectors
 from soro_lib.papers.shared_control.world.people import SAMPLE_TIME
-from soro_lib.papers.shared_control.world.vectors import (
-    delay_line,
-    difference,
-    row,
-    scattered,
-    set_row,
-    size,
-    towards,
-)
 from soro_lib.robots.soft_growing import (
     eversion_length,
     eversion_proxy,
@@ -194,7 +186,7 @@ def control_error(
 @inlined
 def simulated_tip(tip: Vector, desired: Vector, lag: float) -> Vector:
     """One period of the simulator's first-order tip, exact for the authors' step of 1 % per 10 ms."""
-    return towards(tip, SAMPLE_TIME / (lag + SAMPLE_TIME), desired)
+    return vectors.towards(tip, SAMPLE_TIME / (lag + SAMPLE_TIME), desired)
 
 
 @inlined
@@ -233,7 +225,7 @@ def real_tip(rule: PlantParameters, state: PlantState, desired: Vector) -> Plant
     L_a, in the plane: the angle for small errors. The motors are left out: Eq. (1) maps their commands back
     to this plane without loss.
     """
-    wanted = max(size(desired), rule.minimum_length)
+    wanted = max(vectors.size(desired), rule.minimum_length)
     tilt_bound = math.sin(rule.maximum_tilt)
     aim_x, aim_y = limited(desired[0] / wanted, desired[1] / wanted, tilt_bound)
     error_x, error_y = aim_x - state.direction_x, aim_y - state.direction_y
@@ -273,15 +265,15 @@ def plant_step(
         tip = simulated_tip(state.tip, desired, rule.tip_lag)
         return PlantState(tip, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, state.sample + 1)
     place = state.sample % len(delayed)
-    arriving = row(delayed, place)
-    set_row(delayed, place, desired)
+    arriving = vectors.row(delayed, place)
+    vectors.set_row(delayed, place, desired)
     return real_tip(rule, state, arriving)
 
 
 @inlined
 def tracked_tip(tip: Vector, noise: float, rng: np.random.Generator) -> Vector:
     """The tip as motion capture reports it (Stroppa et al., Section 3.3.1)."""
-    return scattered(tip, noise, rng) if noise > 0.0 else tip
+    return vectors.scattered(tip, noise, rng) if noise > 0.0 else tip
 
 
 class SoftGrowingPlant:
@@ -312,7 +304,7 @@ class SoftGrowingPlant:
             raise ValueError(f"tip must hang below the base (z > 0), got z = {start[2]} m")
         self.rule = parameters.rule()
         self.state = plant_start(start)
-        self.delayed = delay_line(start, self.rule.command_delay)
+        self.delayed = vectors.delay_line(start, self.rule.command_delay)
 
     def step(self, desired: ArrayLike) -> NDArray[np.float64]:
         """Command a position (3,) [m] for one period and return the tip (3,) [m] after it.
@@ -360,7 +352,7 @@ def nearest_item(items: NDArray[np.float64], point: Vector) -> tuple[int, float]
     """Number of the nearest item and its distance [m]."""
     best, least = NOTHING, math.inf
     for index in range(len(items)):
-        distance = size(difference(row(items, index), point))
+        distance = vectors.size(vectors.difference(vectors.row(items, index), point))
         if distance < least:
             best, least = index, distance
     return best, least

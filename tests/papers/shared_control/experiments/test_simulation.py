@@ -161,13 +161,13 @@ import numpy as np
 from soro_lib.papers.shared_control.experiments import simulation
 from soro_lib.papers.shared_control.experiments.claims import claim_probabilities, evaluate_claims
 from soro_lib.papers.shared_control.experiments.demonstrations import effects, run_demonstrations, summary
-from soro_lib.papers.shared_control.figures import results
+from soro_lib.papers.shared_control.figures import paper
 run_demonstrations(1, 1, trials=1)
 metrics = np.abs(np.random.default_rng(1).normal(20.0, 3.0, (250, len(simulation.METRICS))))
 simulation.simulate_chunk = lambda plans, time_limit: metrics[: len(plans)].copy()
 trials = run_demonstrations(3200, 1)
 summary(trials), effects(trials), claim_probabilities(evaluate_claims(trials))
-results.fig07b_time(trials), results.fig08_error_against_time(trials)
+paper.fig07b_time(trials), paper.fig08_error_against_time(trials)
 # Not ru_maxrss, which begins with the memory of the process that started this one.
 status = dict(line.split(":") for line in open("/proc/self/status"))
 print(json.dumps([len(trials), int(status["VmHWM"].split()[0]) / 1024]))

@@ -210,7 +210,7 @@ def test_damaged_archive_and_binary_file_are_refused(tmp_path):
 
 
 def test_endless_file_is_refused(short_file, tmp_path, monkeypatch):
-    monkeypatch.setattr("soro_lib.papers.shared_control.experiments.trials.MAXIMUM_ROWS", 100)
+    monkeypatch.setattr("soro_lib.papers.shared_control.experiments.trial_format.MAXIMUM_ROWS", 100)
     with pytest.raises(TrialError, match=r"samples, bound 100; cut the file"):
         load_trial(short_file)
 
