@@ -276,16 +276,15 @@ def sensitivity(count: int, seed: int, trials: int = 2, **run: Any) -> tuple[pd.
 
     run = {"time_limit": 120.0, **run}
     results = margins(sweep(case, (seed, 6), trials, run, paradigm=PARADIGMS))
-    correlations = pd.DataFrame(index=list(RANGES), columns=results.columns, dtype=float)
-    for name in RANGES:
-        values = [getattr(person, name) for person in people]
-        correlations.loc[name] = results.apply(
-            lambda margin, values=values: spearmanr(values, margin, nan_policy="omit").statistic
-        )
+    parameters = [[getattr(person, name) for person in people] for name in RANGES]
+    correlations = {
+        name: [spearmanr(values, margin, nan_policy="omit").statistic for values in parameters]
+        for name, margin in results.items()
+    }
     share = (results.drop(columns="Force of AAN") > 0).mean()
     spread = 1.96 * np.sqrt(share * (1 - share) / count)
     held = pd.DataFrame({"probability": share, "low": share - spread, "high": share + spread})
-    return correlations, held.rename_axis("conclusion").reset_index()
+    return pd.DataFrame(correlations, index=list(RANGES)), held.rename_axis("conclusion").reset_index()
 
 
 # --- How stiff the guidance may be before hand and arm swing against each other -----------------------------

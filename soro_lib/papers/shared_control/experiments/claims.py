@@ -6,6 +6,7 @@ Source: Stroppa et al., Sections 5.4 and 5.5; thresholds for "alike" and "not fe
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from operator import lt
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -145,15 +146,12 @@ def operator_means(trials: pd.DataFrame) -> Means:
     mapping of str to pandas.DataFrame
         By metric; of the path the longest, not the mean.
     """
-    metrics = (TIME, ERROR, FORCE, "path_m", "finished")
-    return {
-        metric: trials.pivot_table(
-            index="operator",
-            columns="paradigm",
-            values=metric,
-            aggfunc="max" if metric == "path_m" else "mean",
-        )
-        for metric in metrics
+
+    def table(metric: str, how: Literal["mean", "max"] = "mean") -> pd.DataFrame:
+        return trials.pivot_table(index="operator", columns="paradigm", values=metric, aggfunc=how)
+
+    return {metric: table(metric) for metric in (TIME, ERROR, FORCE, "finished")} | {
+        "path_m": table("path_m", "max")
     }
 
 

@@ -167,7 +167,8 @@ def effects(trials: pd.DataFrame, resamples: int = 2000) -> pd.DataFrame:
     reference = people["paradigm"] == "full_teleoperation"
     base = people[reference].set_index(keys)[list(RESULTS)]
     others = people[~reference].set_index([*CELLS, "operator"])
-    return _over_people(others - base.reindex(others.index.droplevel("paradigm")).to_numpy(), resamples)
+    aligned = base.reindex(others.reset_index("paradigm").index).to_numpy()
+    return _over_people(others.sub(aligned), resamples)
 
 
 LARGEST_DRAW = 250_000

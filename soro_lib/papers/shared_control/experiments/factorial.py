@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import AnovaRM, anova_lm
@@ -211,7 +211,7 @@ def implied_trial_deviation(effect: float, f: float, trials_per_cell: int = 32) 
     return float(abs(effect) / np.sqrt(f) * np.sqrt(3 * trials_per_cell / 2))
 
 
-def printed_p_value(f: ArrayLike, df: int = 1, df_error: int = 2) -> Any:
+def printed_p_value(f: Any, df: int = 1, df_error: int = 2) -> Any:
     """Probability of a larger F."""
     return f_distribution.sf(f, df, df_error)
 

@@ -7,6 +7,7 @@ Source: Stroppa et al., Sections 3 to 5.1; the scene is that of the authors' pub
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -92,7 +93,7 @@ class TaskSettings:
     paradigm: Paradigm = PARADIGMS["full_teleoperation"]
     environment: Literal["simulated", "real"] = "simulated"
     force_law: Literal["printed", "program"] = "printed"
-    assist_as_needed: dict[str, object] = field(default_factory=dict)
+    assist_as_needed: Mapping[str, object] = field(default_factory=dict)
     scene: Scene = Scene()
     detection_error: Vector = (0.0, 0.0, 0.0)
     lift: bool | None = None
@@ -112,9 +113,8 @@ class TaskSettings:
         """
         program = self.force_law == "program"
         as_needed = {"near_distance": 0.05, "counter": "program"} if program else {}
-        fixed = {"near_distance": 0.03, "damping": 0.0} if program else {}
         assist = AssistAsNeeded(**{**as_needed, **self.assist_as_needed})  # type: ignore[arg-type]
-        spring = FixedAssistance(**fixed)
+        spring = FixedAssistance(near_distance=0.03, damping=0.0) if program else FixedAssistance()
         real = self.environment == "real"
         plant = arm.real_arm(self.tracking_noise) if real else arm.PlantParameters()
         error = np.array(vector("detection_error", self.detection_error))
@@ -204,7 +204,7 @@ class TaskState(NamedTuple):
 def task_start(rule: TaskRule, start: Vector) -> tuple[TaskState, TaskMemory]:
     """A trial before its first sample: tip at rest, gripper open, no force."""
     items, first = np.array(rule.items, dtype=float), rule.goals.items[0]
-    delayed = delay_line(start, rule.plant.command_delay)
+    delayed = delay_line(start, round(rule.plant.command_delay))
     memory = TaskMemory(np.zeros(rule.window), delayed, items, np.full((len(items), 2), np.nan))
     state = TaskState(
         sample=0,

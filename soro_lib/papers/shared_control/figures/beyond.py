@@ -141,7 +141,7 @@ def blend_surface(trials: pd.DataFrame) -> Figure:
     for row, (kind, group) in zip(grid, trials.groupby("kind", sort=False), strict=True):
         for axes, (metric, label) in zip(row, metrics.items(), strict=True):
             surface = group.pivot_table(index="steering", columns="eversion", values=metric, aggfunc="median")
-            logs = np.log10(surface)
+            logs = pd.DataFrame(np.log10(surface), surface.index, surface.columns)
             words = surface.map(lambda value: f"\n{value:.0f}" if value >= 10 else f"\n{value:.1f}")
             for corner, name in corners.items():
                 words.loc[corner] = name + words.loc[corner]

@@ -56,7 +56,7 @@ def _shade(
         name = names[codes[start]]
         label = None if name in named or name == "start" else name
         named.add(name)
-        style = {"color": colors[name], "alpha": 0.25, "linewidth": 0}
+        style: dict[str, Any] = {"color": colors[name], "alpha": 0.25, "linewidth": 0}
         axes.axvspan(time.iloc[start], time.iloc[end - 1] + 0.01, **style, label=label)
 
 
