@@ -27,10 +27,9 @@ from soro_lib.papers.shared_control.experiments.simulation import METRICS, TIME_
 from soro_lib.papers.shared_control.experiments.trial_format import VIEWS, TrialHeader
 from soro_lib.papers.shared_control.experiments.trials import load_trials
 from soro_lib.papers.shared_control.figures.paper import fig02_task
-from soro_lib.papers.shared_control.world.hand import felt_force
+from soro_lib.papers.shared_control.world import vectors
 from soro_lib.papers.shared_control.world.people import DEVICE_SCALE, EXPERT
 from soro_lib.papers.shared_control.world.plant import NOTHING, SAMPLE_TIME, nearest_item
-from soro_lib.papers.shared_control.world.vectors import ZERO, moved, product, scaled, towards
 from soro_lib.project import data_directory, trials_directory
 from soro_lib.replication import as_image
 from soro_lib.replication.frontend import is_live
@@ -71,7 +70,7 @@ class CompliantHand:
 
     def __post_init__(self) -> None:
         positive("stiffness", self.stiffness)
-        self.give = ZERO
+        self.give = vectors.ZERO
 
     def command(self, aim: Vector, force: Vector) -> Vector:
         """Position that the device commands after one sample [m]: the aim, and what the hand gives, scaled.
@@ -84,9 +83,9 @@ class CompliantHand:
             Guidance force on the hand [N].
         """
         share = SAMPLE_TIME / (self.damping / self.stiffness + SAMPLE_TIME)
-        rest = scaled(1.0 / self.stiffness, felt_force(force, self.friction))
-        self.give = towards(self.give, share, rest)
-        return recorder.recordable(moved(aim, 1.0, product(DEVICE_SCALE, self.give)))
+        rest = vectors.scaled(1.0 / self.stiffness, vectors.after_friction(force, self.friction))
+        self.give = vectors.towards(self.give, share, rest)
+        return recorder.recordable(vectors.moved(aim, 1.0, vectors.product(DEVICE_SCALE, self.give)))
 
 
 @dataclass(frozen=True)
@@ -216,7 +215,7 @@ class DrivenTrial:
             "status": self.status,
             "time": round(self.time, 2),
             "tip": _rounded(state.plant.tip),
-            "give": _rounded(product(DEVICE_SCALE, self.hand.give)),
+            "give": _rounded(vectors.product(DEVICE_SCALE, self.hand.give)),
             "desired": _rounded(state.desired),
             "goal": _rounded(state.goal.goal),
             "force": _rounded(state.force),

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from soro_lib.jit import inlined
+from soro_lib.papers.shared_control.world import vectors
 from soro_lib.papers.shared_control.world.people import DEVICE_SCALE, SAMPLE_TIME, Operator, Vector
-from soro_lib.papers.shared_control.world.vectors import difference, moved, product, scaled, scattered, size
 
 HAND_STEPS = 4
 """Steps of the hand's mechanics per period (400 Hz)."""
@@ -53,8 +53,8 @@ def plan_submovement(
     x = gain * (cosine * error[0] - sine * error[1]) / DEVICE_SCALE[0]
     y = gain * (sine * error[0] + cosine * error[1]) / DEVICE_SCALE[1]
     z = gain * error[2] / DEVICE_SCALE[2]
-    length = size((x, y, z))
-    change = scattered((x, y, z), rule.motor_noise * length, rng)
+    length = vectors.size((x, y, z))
+    change = vectors.scattered((x, y, z), rule.motor_noise * length, rng)
     duration = rule.submovement_time + 0.1 * math.log2(1.0 + length / 0.005)
     return Movement(change, time, duration, movement.intention)
 
@@ -64,17 +64,10 @@ def intend(rule: Operator, movement: Movement, hand: Hand, time: float) -> Movem
     """Advance the intended position along the submovement; a yielding operator lets it drift to the hand."""
     now = minimum_jerk((time - movement.start) / movement.duration)
     before = minimum_jerk((time - SAMPLE_TIME - movement.start) / movement.duration)
-    intention = moved(movement.intention, now - before, movement.change)
-    give = difference(hand.position, movement.intention)
-    intention = moved(intention, SAMPLE_TIME / rule.yield_time, give)
+    intention = vectors.moved(movement.intention, now - before, movement.change)
+    give = vectors.difference(hand.position, movement.intention)
+    intention = vectors.moved(intention, SAMPLE_TIME / rule.yield_time, give)
     return Movement(movement.change, movement.start, movement.duration, intention)
-
-
-@inlined
-def felt_force(force: Vector, friction: float) -> Vector:
-    """What the device's friction leaves of a guidance force [N]."""
-    newton = size(force)
-    return scaled(1.0 - friction / newton if newton > friction else 0.0, force)
 
 
 @inlined
@@ -96,9 +89,9 @@ def hand_step(
     """One period of the compliant hand: it follows the intention, drifts, trembles and gives to the force."""
     keep = 1.0 - SAMPLE_TIME / WANDER_TIME
     fresh = rule.wander * math.sqrt(1.0 - keep * keep)
-    drift = scattered(scaled(keep, hand.drift), fresh, rng)
+    drift = vectors.scattered(vectors.scaled(keep, hand.drift), fresh, rng)
     tremor = rule.tremor * math.sin(2.0 * math.pi * TREMOR_FREQUENCY * time)
-    pull = felt_force(force, rule.device_friction)
+    pull = vectors.after_friction(force, rule.device_friction)
     x = pull_axis(rule, hand.position[0], hand.velocity[0], intention[0] + drift[0] + tremor, pull[0])
     y = pull_axis(rule, hand.position[1], hand.velocity[1], intention[1] + drift[1] + tremor, pull[1])
     z = pull_axis(rule, hand.position[2], hand.velocity[2], intention[2] + drift[2] + tremor, pull[2])
@@ -108,4 +101,4 @@ def hand_step(
 @inlined
 def hand_command(hand: Hand) -> Vector:
     """Position commanded by the device [m]."""
-    return product(DEVICE_SCALE, hand.position)
+    return vectors.product(DEVICE_SCALE, hand.position)

@@ -126,15 +126,15 @@ def real_arm(tracking_noise: float | None = None) -> PlantParameters:
 
 
 class PlantState(NamedTuple):
-    """Tip [m]; steering direction, its rate [1/s] and last error; length [m] and growth rate [m/s]."""
+    """Tip [m]; steering direction, its rate [1/s] and last error; length [m] and growth rate [m/s].
+
+    Direction, rate and error lie in the plane of the steering: their z is 0.
+    """
 
     tip: Vector
-    direction_x: float
-    direction_y: float
-    rate_x: float
-    rate_y: float
-    error_x: float
-    error_y: float
+    direction: Vector
+    rate: Vector
+    error: Vector
     length: float
     growth: float
     sample: int
@@ -143,7 +143,8 @@ class PlantState(NamedTuple):
 def plant_start(tip: Vector) -> PlantState:
     """The arm at rest with its tip at a point below the base."""
     length = math.hypot(*tip)
-    return PlantState(tip, tip[0] / length, tip[1] / length, 0.0, 0.0, 0.0, 0.0, length, 0.0, 0)
+    direction = (tip[0] / length, tip[1] / length, 0.0)
+    return PlantState(tip, direction, vectors.ZERO, vectors.ZERO, length, 0.0, 0)
 
 
 def control_error(
@@ -202,19 +203,10 @@ def steering_command(gain: float, damping: float, length: float, error: float, e
 
 
 @inlined
-def limited(x: float, y: float, bound: float) -> tuple[float, float]:
-    """The vector (x, y), shortened to the bound where it is longer."""
-    length = math.sqrt(x * x + y * y)
-    scale = bound / length if length > bound else 1.0
-    return scale * x, scale * y
-
-
-@inlined
-def after_friction(x: float, y: float, friction: float) -> tuple[float, float]:
-    """What Coulomb friction leaves of the command (x, y): nothing below it, the excess above."""
-    length = math.sqrt(x * x + y * y)
-    scale = 1.0 - friction / length if length > friction else 0.0
-    return scale * x, scale * y
+def limited(a: Vector, bound: float) -> Vector:
+    """A vector, shortened to the bound where it is longer."""
+    length = vectors.size(a)
+    return vectors.scaled(bound / length if length > bound else 1.0, a)
 
 
 @inlined
@@ -227,33 +219,29 @@ def real_tip(rule: PlantParameters, state: PlantState, desired: Vector) -> Plant
     """
     wanted = max(vectors.size(desired), rule.minimum_length)
     tilt_bound = math.sin(rule.maximum_tilt)
-    aim_x, aim_y = limited(desired[0] / wanted, desired[1] / wanted, tilt_bound)
-    error_x, error_y = aim_x - state.direction_x, aim_y - state.direction_y
-    last_x = state.error_x if state.sample > 0 else error_x
-    last_y = state.error_y if state.sample > 0 else error_y
+    aim = limited((desired[0] / wanted, desired[1] / wanted, 0.0), tilt_bound)
+    error = vectors.difference(aim, state.direction)
+    change = vectors.difference(error, state.error if state.sample > 0 else error)
     length, gain, damping = state.length, rule.steering_gain, rule.steering_damping
-    command_x = steering_command(gain, damping, length, error_x, (error_x - last_x) / SAMPLE_TIME)
-    command_y = steering_command(gain, damping, length, error_y, (error_y - last_y) / SAMPLE_TIME)
-    command_x, command_y = after_friction(command_x, command_y, gain * rule.cable_friction)
+    x = steering_command(gain, damping, length, error[0], change[0] / SAMPLE_TIME)
+    y = steering_command(gain, damping, length, error[1], change[1] / SAMPLE_TIME)
+    command = vectors.after_friction((x, y, 0.0), gain * rule.cable_friction)
 
     scale = length / REFERENCE_LENGTH
     share = SAMPLE_TIME / (rule.steering_lag * scale + SAMPLE_TIME)
-    rate_x = state.rate_x + share * (command_x / scale - state.rate_x)
-    rate_y = state.rate_y + share * (command_y / scale - state.rate_y)
-    rate_x, rate_y = limited(rate_x, rate_y, rule.maximum_speed / length)
-    x, y = limited(
-        state.direction_x + SAMPLE_TIME * rate_x, state.direction_y + SAMPLE_TIME * rate_y, tilt_bound
-    )
+    rate = vectors.towards(state.rate, share, (command[0] / scale, command[1] / scale, 0.0))
+    rate = limited(rate, rule.maximum_speed / length)
+    direction = limited(vectors.moved(state.direction, SAMPLE_TIME, rate), tilt_bound)
 
     growth_command = eversion_command(rule.eversion_gain, rule.feed_forward, wanted - length)
     share = SAMPLE_TIME / (rule.eversion_lag * scale + SAMPLE_TIME)
     growth = state.growth + share * (growth_command + rule.passive_growth - state.growth)
     growth = min(max(growth, -rule.maximum_speed), rule.maximum_speed)
-    down = math.sqrt(1.0 - x * x - y * y)
+    down = math.sqrt(1.0 - direction[0] * direction[0] - direction[1] * direction[1])
     longest = min(rule.maximum_length, rule.floor / down)
     length = min(max(length + SAMPLE_TIME * growth, rule.minimum_length), longest)
-    tip = (length * x, length * y, length * down)
-    return PlantState(tip, x, y, rate_x, rate_y, error_x, error_y, length, growth, state.sample + 1)
+    tip = vectors.scaled(length, (direction[0], direction[1], down))
+    return PlantState(tip, direction, rate, error, length, growth, state.sample + 1)
 
 
 @inlined
@@ -263,7 +251,7 @@ def plant_step(
     """One period of the arm; ``delayed`` (n, 3) is the ring buffer of commands on their way."""
     if not rule.real:
         tip = simulated_tip(state.tip, desired, rule.tip_lag)
-        return PlantState(tip, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, state.sample + 1)
+        return PlantState(tip, vectors.ZERO, vectors.ZERO, vectors.ZERO, 0.0, 0.0, state.sample + 1)
     place = state.sample % len(delayed)
     arriving = vectors.row(delayed, place)
     vectors.set_row(delayed, place, desired)

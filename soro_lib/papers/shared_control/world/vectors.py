@@ -48,6 +48,13 @@ def size(a: Vector) -> float:
 
 
 @inlined
+def after_friction(force: Vector, friction: float) -> Vector:
+    """What Coulomb friction leaves of a force or command: nothing below it, the excess above."""
+    pull = size(force)
+    return scaled(1.0 - friction / pull if pull > friction else 0.0, force)
+
+
+@inlined
 def scattered(mean: Vector, deviation: float, rng: np.random.Generator) -> Vector:
     """Normally distributed about a mean, with the same standard deviation along every axis."""
     return (

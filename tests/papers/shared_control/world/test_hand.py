@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from soro_lib.papers.shared_control.world.hand import (
     Hand,
     Movement,
-    felt_force,
     hand_step,
     intend,
     minimum_jerk,
     plan_submovement,
 )
 from soro_lib.papers.shared_control.world.people import ATTITUDES, EXPERT
+from soro_lib.papers.shared_control.world.vectors import after_friction
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -54,7 +54,7 @@ def test_the_hand_is_a_damped_oscillator():
 
 @given(st.tuples(*[st.floats(-5, 5)] * 3))
 def test_friction_only_takes_away(force):
-    left, size = np.linalg.norm(felt_force(force, 0.2)), np.linalg.norm(force)
+    left, size = np.linalg.norm(after_friction(force, 0.2)), np.linalg.norm(force)
     assert left == pytest.approx(max(size - 0.2, 0.0), abs=1e-12)
 
 
