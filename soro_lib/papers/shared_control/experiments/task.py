@@ -15,22 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soro_lib.checks import Vector, numbers, one_of, vector
-from soro_lib.controllers.shared_control import goal_selection
-from soro_lib.controllers.shared_control.assist_as_needed import (
-    ASSIST_START,
-    MOTIONS,
-    AssistAsNeeded,
-    AssistRule,
-    AssistState,
-    assist_step,
-)
-from soro_lib.controllers.shared_control.fixed_assistance import (
-    FIXED_START,
-    FixedAssistance,
-    FixedRule,
-    FixedState,
-    fixed_step,
-)
+from soro_lib.controllers.shared_control import assist_as_needed as aan
+from soro_lib.controllers.shared_control import fixed_assistance, goal_selection
 from soro_lib.controllers.shared_control.goal_selection import END, LIFTING_EMPTY, PLACING
 from soro_lib.controllers.shared_control.guidance import distance_to_goal, guidance_force, hooke_magnitude
 from soro_lib.controllers.shared_control.paradigms import ASSISTANCES, PARADIGMS, Paradigm, desired_position
@@ -113,8 +99,9 @@ class TaskSettings:
         """
         program = self.force_law == "program"
         as_needed = {"near_distance": 0.05, "counter": "program"} if program else {}
-        assist = AssistAsNeeded(**{**as_needed, **self.assist_as_needed})  # type: ignore[arg-type]
-        spring = FixedAssistance(near_distance=0.03, damping=0.0) if program else FixedAssistance()
+        assist = aan.AssistAsNeeded(**{**as_needed, **self.assist_as_needed})  # type: ignore[arg-type]
+        fixed = {"near_distance": 0.03, "damping": 0.0} if program else {}
+        spring = fixed_assistance.FixedAssistance(**fixed)  # type: ignore[arg-type]
         real = self.environment == "real"
         plant = arm.real_arm(self.tracking_noise) if real else arm.PlantParameters()
         error = np.array(vector("detection_error", self.detection_error))
@@ -147,9 +134,9 @@ class TaskRule(NamedTuple):
     goals: goal_selection.GoalRule
     items: tuple[Vector, ...]
     targets: tuple[Vector, ...]
-    assist: AssistRule
+    assist: aan.AssistRule
     assist_maximum: float
-    fixed: FixedRule
+    fixed: fixed_assistance.FixedRule
     window: int
     plant: arm.PlantParameters
     gripper: arm.GripperRule
@@ -189,8 +176,8 @@ class TaskState(NamedTuple):
 
     sample: int
     goal: goal_selection.GoalState
-    assist: AssistState
-    fixed: FixedState
+    assist: aan.AssistState
+    fixed: fixed_assistance.FixedState
     plant: arm.PlantState
     gripper: arm.GripperState
     automatic: Vector
@@ -209,8 +196,8 @@ def task_start(rule: TaskRule, start: Vector) -> tuple[TaskState, TaskMemory]:
     state = TaskState(
         sample=0,
         goal=goal_selection.GoalState(0, 0, first, first),
-        assist=ASSIST_START,
-        fixed=FIXED_START,
+        assist=aan.ASSIST_START,
+        fixed=fixed_assistance.FIXED_START,
         plant=arm.plant_start(start),
         gripper=arm.GripperState(arm.NOTHING, -1.0),
         automatic=start,
@@ -238,17 +225,17 @@ def carry(rule: TaskRule, items: NDArray[np.float64], before: int, after: int, t
 @inlined
 def assist(
     rule: TaskRule, state: TaskState, window: NDArray[np.float64], tip: Vector, goal: Vector
-) -> tuple[AssistState, FixedState, float, Vector]:
+) -> tuple[aan.AssistState, fixed_assistance.FixedState, float, Vector]:
     """The assistance of the paradigm: its states, |f| and the rendered force [N]."""
     assisted, fixed = state.assist, state.fixed
     if rule.assistance == UNASSISTED:
         return assisted, fixed, 0.0, ZERO
     distance = distance_to_goal(tip, goal)
     if rule.assistance == AS_NEEDED:
-        assisted = assist_step(rule.assist, assisted, distance, 1.0)
+        assisted = aan.assist_step(rule.assist, assisted, distance, 1.0)
         magnitude = hooke_magnitude(assisted.stiffness, distance, rule.assist_maximum)
     else:
-        fixed = fixed_step(rule.fixed, fixed, window, distance, 1.0)
+        fixed = fixed_assistance.fixed_step(rule.fixed, fixed, window, distance, 1.0)
         magnitude = fixed.magnitude
     return assisted, fixed, magnitude, guidance_force(magnitude, tip, goal, rule.unit_direction)
 
@@ -446,7 +433,7 @@ class Trial:
             force=np.array(state.force),
             stiffness=stiffness.get(self.rule.assistance, 0.0),
             magnitude=state.magnitude,
-            motion=MOTIONS[state.assist.motion],
+            motion=aan.MOTIONS[state.assist.motion],
             phase=goal_selection.PHASES[state.goal.phase],
             item=state.gripper.item,
             items=self.memory.items.copy(),

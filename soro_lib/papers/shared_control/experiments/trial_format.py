@@ -136,12 +136,8 @@ class TrialHeader:
 
     def settings(self) -> TaskSettings:
         """The task as it was set."""
-        return TaskSettings(
-            PARADIGMS[self.paradigm],
-            environment=self.environment,  # type: ignore[arg-type]
-            force_law=self.force_law,  # type: ignore[arg-type]
-            scene=self.scene,
-        )
+        conditions: dict[str, Any] = {"environment": self.environment, "force_law": self.force_law}
+        return TaskSettings(PARADIGMS[self.paradigm], scene=self.scene, **conditions)
 
     def task(self) -> Trial:
         """The task before its first sample; what is left to chance depends on the seed alone."""

@@ -48,14 +48,10 @@ class RecordedTrial:
     @property
     def trace(self) -> pd.DataFrame:
         """The samples as `trace_trial` gives them, for the same figures."""
-        samples = self.samples
-        gap = self.points("goal") - self.points("tip")
-        computed = {
-            "distance_m": np.linalg.norm(gap, axis=1),
-            "item": samples["item_held"] - 1.0,
-            "closed": samples["gripper_closed"],
-        }
-        return samples.assign(**computed)[list(TRACE)].astype(float)
+        distance = np.linalg.norm(self.points("goal") - self.points("tip"), axis=1)
+        item, closed = self.samples["item_held"] - 1.0, self.samples["gripper_closed"]
+        trace = self.samples.assign(distance_m=distance, item=item, closed=closed)
+        return trace[list(TRACE)].astype(float)
 
     @property
     def finished(self) -> bool:
