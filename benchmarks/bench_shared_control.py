@@ -39,7 +39,7 @@ from soro_lib.papers.shared_control.experiments.simulation import (
     play_trial,
     simulate,
 )
-from soro_lib.papers.shared_control.world import NAIVE
+from soro_lib.papers.shared_control.world.people import NAIVE
 
 CORES = 2
 """Threads; the issue states its goals for two cores."""

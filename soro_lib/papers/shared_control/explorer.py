@@ -22,19 +22,13 @@ from numpy.typing import ArrayLike
 from soro_lib.checks import Vector, positive
 from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.controllers.shared_control.goal_selection import PHASES
-from soro_lib.papers.shared_control.experiments.recorder import (
-    TrialRecorder,
-    next_number,
-    recordable,
-    sample_line,
-)
+from soro_lib.papers.shared_control.experiments import recorder
 from soro_lib.papers.shared_control.experiments.simulation import METRICS, TIME_LIMIT, trial_metrics
 from soro_lib.papers.shared_control.experiments.trial_format import VIEWS, TrialHeader
 from soro_lib.papers.shared_control.experiments.trials import load_trials
-from soro_lib.papers.shared_control.figures import fig02_task
-from soro_lib.papers.shared_control.world import EXPERT
-from soro_lib.papers.shared_control.world.hand import felt_force
-from soro_lib.papers.shared_control.world.people import DEVICE_SCALE
+from soro_lib.papers.shared_control.figures.paper import fig02_task
+from soro_lib.papers.shared_control.world import vectors
+from soro_lib.papers.shared_control.world.people import DEVICE_SCALE, EXPERT
 from soro_lib.papers.shared_control.world.plant import NOTHING, SAMPLE_TIME, nearest_item
 from soro_lib.project import data_directory, trials_directory
 from soro_lib.replication import as_image
@@ -49,6 +43,7 @@ TABLE = 0.67
 HAND_STIFFNESSES = (50.0, 75.0, 100.0, 150.0, 225.0, 300.0, 450.0, 600.0)
 """Hands to choose from [N/m]: hardly holding on to gripping firmly."""
 
+SHIPPED_TRIALS = data_directory("shared_control") / "trials"
 LONGEST_GAP = 5.0
 """Longest time between two inputs that is believed [s]."""
 
@@ -75,7 +70,7 @@ class CompliantHand:
 
     def __post_init__(self) -> None:
         positive("stiffness", self.stiffness)
-        self.give: Vector = (0.0, 0.0, 0.0)
+        self.give = vectors.ZERO
 
     def command(self, aim: Vector, force: Vector) -> Vector:
         """Position that the device commands after one sample [m]: the aim, and what the hand gives, scaled.
@@ -88,10 +83,9 @@ class CompliantHand:
             Guidance force on the hand [N].
         """
         share = SAMPLE_TIME / (self.damping / self.stiffness + SAMPLE_TIME)
-        pull = felt_force(force, self.friction)
-        x, y, z = (give + share * (newton / self.stiffness - give) for give, newton in zip(self.give, pull))
-        self.give = (x, y, z)
-        return recordable([place + scale * give for place, scale, give in zip(aim, DEVICE_SCALE, self.give)])
+        rest = vectors.scaled(1.0 / self.stiffness, vectors.after_friction(force, self.friction))
+        self.give = vectors.towards(self.give, share, rest)
+        return recorder.recordable(vectors.moved(aim, 1.0, vectors.product(DEVICE_SCALE, self.give)))
 
 
 @dataclass(frozen=True)
@@ -142,9 +136,8 @@ class DrivenTrial:
         self.header = header
         self.task = header.task()
         self.hand = CompliantHand(header.hand_stiffness)
-        self.recorder = TrialRecorder(folder, header)
+        self.recorder = recorder.TrialRecorder(folder, header)
         self.input = Input(0.0, header.scene.start, False, False)
-        self.command = header.scene.start
         self.skipped = 0
         self.status = "armed"
 
@@ -187,15 +180,12 @@ class DrivenTrial:
     def _step(self) -> str:
         """One sample of the task, and its line in the recording."""
         now = self.input
-        self.command = self.hand.command(now.aim, self.task.state.force)
-        sample = self.task.step(self.command, now.closed, now.confirmed)
-        self.status = "running"
-        if sample.done:
-            self.status = "done"
-        elif self.time >= TIME_LIMIT - SAMPLE_TIME / 2:
-            self.status = "time out"
+        command = self.hand.command(now.aim, self.task.state.force)
+        sample = self.task.step(command, now.closed, now.confirmed)
+        late = self.time >= TIME_LIMIT - SAMPLE_TIME / 2
+        self.status = "done" if sample.done else "time out" if late else "running"
         item = self.task.state.goal.item
-        return sample_line(sample, now.aim, self.command, now.closed, now.confirmed, item)
+        return recorder.sample_line(sample, now.aim, command, now.closed, now.confirmed, item)
 
     def stop(self, status: str = "stopped") -> None:
         """Leave the trial; its recording stays, marked as cut off."""
@@ -225,7 +215,7 @@ class DrivenTrial:
             "status": self.status,
             "time": round(self.time, 2),
             "tip": _rounded(state.plant.tip),
-            "give": _rounded(np.multiply(DEVICE_SCALE, self.hand.give)),
+            "give": _rounded(vectors.product(DEVICE_SCALE, self.hand.give)),
             "desired": _rounded(state.desired),
             "goal": _rounded(state.goal.goal),
             "force": _rounded(state.force),
@@ -277,9 +267,8 @@ class OperatorExplorer(ipywidgets.VBox):
         self.operator, self.seed = operator, seed
         self.trial: DrivenTrial | None = None
         self.runs = 0
-        self.paradigm = _choice(
-            "paradigm", [(value.title, name) for name, value in PARADIGMS.items()], "340px"
-        )
+        titles = [(value.title, name) for name, value in PARADIGMS.items()]
+        self.paradigm = _choice("paradigm", titles, "340px")
         self.environment = _choice("arm", ["simulated", "real"], "170px")
         self.law = _choice("force law", ["printed", "program"], "190px")
         self.stiffness = ipywidgets.SelectionSlider(
@@ -327,7 +316,7 @@ class OperatorExplorer(ipywidgets.VBox):
             self.environment.value,
             operator=self.operator,
             force_law=self.law.value,
-            seed=(self.seed, next_number(self.folder)),
+            seed=(self.seed, recorder.next_number(self.folder)),
             hand_stiffness=float(self.stiffness.value),
             view=self.sight.value,
         )
@@ -379,7 +368,7 @@ def explore(folder: str | Path | None = None) -> OperatorExplorer | Image:
     if is_live():
         return OperatorExplorer(folder)
     shown = {"Full Teleoperation": 0, "Assist-as-Needed": 1, "Mostly Autonomous": 5}
-    trials = load_trials(data_directory("shared_control") / "trials")
+    trials = load_trials(SHIPPED_TRIALS)
     traces = {title: trials[number].trace for title, number in shown.items()}
     return as_image(fig02_task(traces, trials[0].header.scene))
 
@@ -403,11 +392,8 @@ def trials_to_show(folder: str | Path | None = None) -> Path:
             raise FileNotFoundError(f"no such folder of trials: {folder}")
         return Path(folder)
     own = trials_directory()
-    return (
-        own
-        if is_live() and own.is_dir() and load_trials(own)
-        else data_directory("shared_control") / "trials"
-    )
+    driven = is_live() and own.is_dir() and load_trials(own)
+    return own if driven else SHIPPED_TRIALS
 
 
 def _choice(description: str, options: Sequence[Any], width: str) -> ipywidgets.Dropdown:
@@ -418,5 +404,4 @@ def _choice(description: str, options: Sequence[Any], width: str) -> ipywidgets.
 
 def _rounded(values: ArrayLike) -> list:
     """Nested lists rounded to 10 micrometres or micronewtons: all that a drawing needs."""
-    rounded: list = np.asarray(values, dtype=float).round(5).tolist()
-    return rounded
+    return np.asarray(values, dtype=float).round(5).tolist()

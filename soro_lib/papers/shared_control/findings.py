@@ -7,18 +7,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from soro_lib.controllers.shared_control import PARADIGMS, AssistAsNeeded, FixedAssistance
+from soro_lib.papers.shared_control.experiments import factorial
 from soro_lib.papers.shared_control.experiments.claims import evaluate_claims
 from soro_lib.papers.shared_control.experiments.demonstrations import TRIALS
-from soro_lib.papers.shared_control.experiments.factorial import (
-    CONTRASTS,
-    FACTORS,
-    Contrast,
-    blocked_f,
-    contrast_samples,
-    interaction_samples,
-    printed_p_value,
-    repeated_measures_anova,
-)
 from soro_lib.papers.shared_control.experiments.task import Scene
 from soro_lib.papers.shared_control.world.plant import TRACKING_RATE
 from soro_lib.replication.findings import Finding
@@ -37,34 +28,30 @@ PRINTED_F: Mapping[str, float] = {
 """Inputs of the arithmetic check of the printed p: nothing that is simulated sees them."""
 
 ACTIVE = "operators who steer by sight leave the guidance little to do; seconds are lost only by passive ones"
+IMPOSSIBLE = (
+    "cannot be: H is the mean of a force that is capped at 7 N",
+    "a higher k_MAX pulls harder, so a lower one cannot assist more",
+)
 SCATTER = "an F with two error degrees of freedom scatters over decades from one operator to the next"
 REASONS: Mapping[str, str] = {
     "auto_shortest": "its three compulsory lifts cost a skilled operator more than steering by hand does",
     "auto_most_accurate": "under ASME x and y converge while the operator still lowers the tip",
     "auto_error_not_zero": "the tip creeps in; how near the real one gets depends on gains not printed",
-    "autonomy_shorter": "",
     "gradual_time": "the lifts of the automatic eversion cost a skilled operator more than they save",
     "gradual_error": "ASME places better than Mostly Autonomous: its slower descent lets x and y converge",
     "asme_shorter": "a skilled operator moves two axes at once; descending by hand then waits for the lag",
     "asme_more_accurate": "lowering by hand turns the way to the goal; friction swallows the last correction",
     "fixed_like_msae_time": "the constant pull displaces the hand, and sight has to undo it",
     "fixed_like_msae_error": "a pull towards the true goal is undone by an operator who trusts his eyes",
-    "fixed_slower_msae": "",
-    "fixed_less_accurate_msae": "",
     "aan_shorter_fixed": "a toss-up unless the force is taken for a cue",
     "aan_more_accurate_fixed": "a toss-up: neither force changes where an operator believes the goal to be",
-    "aan_like_full_time": "",
-    "aan_like_full_error": "",
     "aan_not_felt": "some experts rest outside th_D long enough to be pushed, more so on the real arm",
     "aan_shorter_full": "a toss-up person by person; only the mean over many shows a small gain, if any",
     "aan_more_accurate_full": "the item is released before the stiffness has risen, unless the dwell is long",
     "stable": "some naive users hunt against lag and delay until the time limit",
-    "expert_faster": "",
-    "expert_more_accurate": "",
-    "expert_less_assisted": "",
     "aan_gain_larger_simulated": "delay and lag of the real arm make the constant pull worse, not AAN better",
 }
-"""Why a claim holds as often as it does; shown beside the verdict."""
+"""Why a claim holds as often as it does, where it is not plain; shown beside the verdict."""
 
 
 def definitions() -> dict[str, Finding]:
@@ -84,97 +71,89 @@ def definitions() -> dict[str, Finding]:
         "table3_xi_c": aan.rule.approach_delay / aan.sample_rate,
         "table3_xi_a": aan.rule.away_delay / aan.sample_rate,
         "table3_k_max": aan.rule.maximum_stiffness,
-        "factorial_settings": 2 ** len(FACTORS),
-        "factorial_trials": 3 * 2 ** len(FACTORS),
+        "factorial_settings": 2 ** len(factorial.FACTORS),
+        "factorial_trials": 3 * 2 ** len(factorial.FACTORS),
         "demonstration_trials": TRIALS * len(PARADIGMS),
         "redistribution": REDISTRIBUTION,
         "tracking_rate": TRACKING_RATE,
     }
-    values |= {f"table2_{name}_low": levels[0] for name, levels in FACTORS.items()}
-    values |= {f"table2_{name}_high": levels[1] for name, levels in FACTORS.items()}
-    scenery = {
-        "plane_depth": Finding(
-            1e3 * max(item[2] for item in scene.items),
-            "centres of the items in the authors' simulator; its table lies at 670 mm",
-        ),
-        "item_target_distance": Finding(
-            1e2 * float(apart.mean()),
-            "the authors' simulator has 57 and 58 cm; 30 cm is the distance of the items",
-        ),
+    for name, (low, high) in factorial.FACTORS.items():
+        values |= {f"table2_{name}_low": low, f"table2_{name}_high": high}
+    depth = "centres of the items in the authors' simulator; its table lies at 670 mm"
+    distance = "the authors' simulator has 57 and 58 cm; 30 cm is the distance of the items"
+    return {name: Finding(value) for name, value in values.items()} | {
+        "plane_depth": Finding(1e3 * max(item[2] for item in scene.items), depth),
+        "item_target_distance": Finding(1e2 * apart.mean(), distance),
     }
-    return {name: Finding(value) for name, value in values.items()} | scenery
 
 
 def printed_p_values() -> dict[str, Finding]:
     """The p that belong to the printed F(1, 2): they match only with two error degrees of freedom."""
-    p = {name: printed_p_value(f) for name, f in PRINTED_F.items()}
-    below = {"fmax_time", "xi_s_path"}
-    findings = {f"p_{name}": Finding(value) for name, value in p.items() if name not in below}
-    return findings | {f"p_{name}_below": Finding(float(p[name] < 0.01)) for name in below}
+    p = {name: factorial.printed_p_value(f) for name, f in PRINTED_F.items()}
+    below = {name: Finding(p.pop(name) < 0.01) for name in ("fmax_time", "xi_s_path")}
+    return {f"p_{name}": Finding(value) for name, value in p.items()} | {
+        f"p_{name}_below": finding for name, finding in below.items()
+    }
 
 
 def factorial_findings(trials: pd.DataFrame) -> dict[str, Finding]:
     """Effects, F and signs of the tuning study; a sample per operator."""
     findings = {}
-    for contrast in CONTRASTS:
-        samples = contrast_samples(trials, contrast)
+    for contrast in factorial.CONTRASTS:
+        samples = factorial.contrast_samples(trials, contrast)
         effect = samples.mean(axis=1)
-        reason = ACTIVE
-        if contrast.name == "kmax_assistance":
-            reason = "cannot be: H is the mean of a force that is capped at 7 N"
-        findings[f"effect_{contrast.name}"] = Finding(effect, reason)
-        findings[f"f_{contrast.name}"] = Finding(blocked_f(samples), SCATTER, "median")
-        sign = (np.sign(effect) == contrast.sign).astype(float)
-        against = "a higher k_MAX pulls harder, so a lower one cannot assist more"
-        findings[f"sign_{contrast.name}"] = Finding(
-            sign, against if contrast.name == "kmax_assistance" else ACTIVE
-        )
-    interaction = interaction_samples(trials, "assistance_n", "xi_c", "xi_s")
-    findings["f_interaction"] = Finding(blocked_f(interaction), SCATTER, "median")
+        why, against = IMPOSSIBLE if contrast.name == "kmax_assistance" else (ACTIVE, ACTIVE)
+        findings[f"effect_{contrast.name}"] = Finding(effect, why)
+        findings[f"f_{contrast.name}"] = Finding(factorial.blocked_f(samples), SCATTER, "median")
+        findings[f"sign_{contrast.name}"] = Finding(np.sign(effect) == contrast.sign, against)
+    interaction = factorial.interaction_samples(trials, "assistance_n", "xi_c", "xi_s")
+    findings["f_interaction"] = Finding(factorial.blocked_f(interaction), SCATTER, "median")
     findings["sign_interaction"] = Finding(_largest_assistance(trials))
     findings["sign_error_insensitive"] = Finding(
         _error_insensitive(trials), "six tests at 5 % pass together in 74 % of studies by chance alone"
     )
     first = trials[trials["operator"] == 0]
-    anova = repeated_measures_anova(first, "time_s")
-    return findings | {"error_df": Finding(float(anova["df_error"].iloc[0]))}
+    anova = factorial.repeated_measures_anova(first, "time_s")
+    return findings | {"error_df": Finding(anova["df_error"].iloc[0])}
 
 
-def _largest_assistance(trials: pd.DataFrame) -> NDArray[np.float64]:
+def _largest_assistance(trials: pd.DataFrame) -> NDArray[np.bool_]:
     """Whether H is largest for xi_C high and xi_S low, for each operator."""
     cells = trials.pivot_table(index="operator", columns=["xi_c", "xi_s"], values="assistance_n")
-    return np.array([cell == (1, 0) for cell in cells.idxmax(axis=1)], dtype=float)
+    return np.array([cell == (1, 0) for cell in cells.idxmax(axis=1)])
 
 
-def _error_insensitive(trials: pd.DataFrame) -> NDArray[np.float64]:
+def _error_insensitive(trials: pd.DataFrame) -> NDArray[np.bool_]:
     """Whether no main effect on the placement error is significant, for each operator."""
-    mains = [Contrast(name, "", "placement_error_mm", {name: 1}, {name: 0}, 1.0) for name in FACTORS]
-    p = [[printed_p_value(f) for f in blocked_f(contrast_samples(trials, main))] for main in mains]
-    return np.all(np.array(p) >= 0.05, axis=0).astype(float)
+    p = []
+    for name in factorial.FACTORS:
+        main = factorial.Contrast(name, "placement_error_mm", {name: 1}, {name: 0}, 1.0)
+        p.append(factorial.printed_p_value(factorial.blocked_f(factorial.contrast_samples(trials, main))))
+    return np.all(np.array(p) >= 0.05, axis=0)
 
 
 def claim_findings(demonstrations: pd.DataFrame) -> dict[str, Finding]:
     """Every ordinal claim; a sample per operator, 1 where it holds."""
     held = evaluate_claims(demonstrations)
     return {
-        str(name): Finding(group["holds"].to_numpy(), REASONS[group["claim"].iloc[0]])
+        str(name): Finding(group["holds"].to_numpy(), REASONS.get(group["claim"].iloc[0], ""))
         for name, group in held.groupby("id", sort=False)
     }
 
 
-def findings(demonstrations: pd.DataFrame, factorial: pd.DataFrame) -> dict[str, Finding]:
+def findings(demonstrations: pd.DataFrame, tuning: pd.DataFrame) -> dict[str, Finding]:
     """All findings, keyed by the published row.
 
     Parameters
     ----------
     demonstrations : pandas.DataFrame
         Of `run_demonstrations`: both kinds, both environments.
-    factorial : pandas.DataFrame
+    tuning : pandas.DataFrame
         Of `run_factorial`, several operators, three repetitions each.
     """
     return {
         **definitions(),
         **printed_p_values(),
-        **factorial_findings(factorial),
+        **factorial_findings(tuning),
         **claim_findings(demonstrations),
     }

@@ -20,8 +20,7 @@ from soro_lib.papers.shared_control.explorer import (
     explore,
     trials_to_show,
 )
-from soro_lib.papers.shared_control.world import EXPERT
-from soro_lib.papers.shared_control.world.people import DEVICE_SCALE
+from soro_lib.papers.shared_control.world.people import DEVICE_SCALE, EXPERT
 from soro_lib.project import data_directory
 from soro_lib.replication import frontend
 

@@ -33,8 +33,9 @@ from soro_lib.papers.cross_robot.world.benches import (
     as_it_is,
     resized,
 )
-from soro_lib.papers.shared_control.world.hand import felt_force, pull_axis
+from soro_lib.papers.shared_control.world.hand import pull_axis
 from soro_lib.papers.shared_control.world.people import DEVICE_SCALE, SAMPLE_TIME, Operator
+from soro_lib.papers.shared_control.world.vectors import after_friction
 from soro_lib.robots import PneumaticArm
 from soro_lib.robots.base import Robot
 from soro_lib.sensing.hand_tracking import HandSample
@@ -147,7 +148,7 @@ class Guided:
 
     def _felt(self, tip: Array, goal: Array) -> Array:
         forces = [
-            felt_force(tuple(assistance.update(place, goal).force), self.person.device_friction)
+            after_friction(tuple(assistance.update(place, goal).force), self.person.device_friction)
             for assistance, place in zip(self.assistances, tip, strict=False)
         ]
         return np.array(forces) if forces else np.zeros_like(tip)

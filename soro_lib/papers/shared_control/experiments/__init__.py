@@ -1,10 +1,5 @@
-"""The experiments of Stroppa et al.: the task, its simulated trials, the factorial, the demonstrations.
+"""The experiments of Stroppa et al.: the task, its simulated trials, the demonstrations, the tuning study.
 
-``load_trials`` brings recorded trials into the same metrics and figures.
+Here belongs what repeats or judges something that the paper did, and the recorded trials, which go through
+the same metrics; what the paper leaves open is in the room's `beyond`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__, submod_attrs={"trials": ["load_trials", "trial_table"]}
-)

@@ -3,13 +3,16 @@
 Source: Stroppa et al., Sections 5.4 and 5.5; thresholds for "alike" and "not felt" are ours, stated here.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import lt
 from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
+
+from soro_lib.controllers.shared_control import PARADIGMS
 
 ALIKE_TIME, ALIKE_ERROR = 0.15, 0.25
 """Relative differences up to which two paradigms count as alike; a dead heat within one person's scatter."""
@@ -24,167 +27,107 @@ STABLE_PATH = 20.0
 """Path beyond which a trial counts as unstable [m], eight times the shortest way."""
 
 
-@dataclass(frozen=True)
-class Means:
-    """Mean results by operator: each table has one line per operator and one column per paradigm."""
-
-    time: pd.DataFrame
-    error: pd.DataFrame
-    force: pd.DataFrame
-    path: pd.DataFrame
-    finished: pd.DataFrame
-
-
-Held = Callable[[Means], pd.Series]
+TIME, ERROR, FORCE = "time_s", "release_error_mm", "assistance_n"
+FULL, AAN, FIXED, MSAE, ASME, AUTO = PARADIGMS
+NAMES = {
+    **{FULL: "Full Teleoperation", AAN: "Assist-as-Needed", FIXED: "Fixed Assistance"},
+    **{MSAE: "MSAE", ASME: "ASME", AUTO: "Mostly Autonomous"},
+}
+Means = Mapping[str, pd.DataFrame]
+"""Mean results by metric: each table has one line per operator and one column per paradigm."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim about operators of one kind: its name, its words, and whom it concerns."""
+    """A claim about operators of one kind: its name, its words, whom it concerns, and for whom it holds."""
 
     name: str
     text: str
     kinds: tuple[str, ...]
-    holds: Held
+    holds: Callable[[Means], pd.Series]
 
 
-def shortest(means: Means) -> pd.Series:
-    """Mostly autonomous has the shortest mean time of the six."""
-    return means.time.idxmin(axis=1) == "mostly_autonomous"
+def best(metric: str) -> Callable[[Means], pd.Series]:
+    """Mostly autonomous has the smallest mean of the six."""
+    return lambda means: means[metric].idxmin(axis=1) == AUTO
 
 
-def most_accurate(means: Means) -> pd.Series:
-    """Mostly autonomous has the smallest mean error of the six."""
-    return means.error.idxmin(axis=1) == "mostly_autonomous"
+def gradual(metric: str) -> Callable[[Means], pd.Series]:
+    """Each step from manual to automatic lessens the mean."""
+    return lambda means: (means[metric][[FULL, MSAE, ASME, AUTO]].diff(axis=1).iloc[:, 1:] < 0).all(axis=1)
 
 
-def autonomy_shorter(means: Means) -> pd.Series:
+def all_shorter(means: Means) -> pd.Series:
     """Every paradigm with an automatic axis is faster than full teleoperation."""
-    return means.time[["msae", "asme", "mostly_autonomous"]].max(axis=1) < means.time["full_teleoperation"]
+    return means[TIME][[MSAE, ASME, AUTO]].max(axis=1) < means[TIME][FULL]
 
 
-def gradual(table: str) -> Held:
-    """Each step from manual to automatic improves the table."""
-
-    def holds(means: Means) -> pd.Series:
-        order = getattr(means, table)[["full_teleoperation", "msae", "asme", "mostly_autonomous"]]
-        return (order.diff(axis=1).iloc[:, 1:] < 0).all(axis=1)
-
-    return holds
+def error_not_zero(means: Means) -> pd.Series:
+    """Mostly autonomous does not place exactly."""
+    return means[ERROR][AUTO] > NOT_ZERO
 
 
-def better(table: str, first: str, second: str) -> Held:
-    """The first paradigm has the smaller value."""
-    return lambda means: getattr(means, table)[first] < getattr(means, table)[second]
-
-
-def alike(table: str, first: str, second: str, within: float) -> Held:
-    """The two paradigms differ by at most a share of the second."""
-    return lambda means: (getattr(means, table)[first] / getattr(means, table)[second] - 1).abs() <= within
+def not_felt(means: Means) -> pd.Series:
+    """The mean force of assist-as-needed is below what is felt."""
+    return means[FORCE][AAN] < NOT_FELT
 
 
 def stable(means: Means) -> pd.Series:
     """Every trial ends in time and without wild motion."""
-    return (means.finished == 1).all(axis=1) & (means.path < STABLE_PATH).all(axis=1)
+    return (means["finished"] == 1).all(axis=1) & (means["path_m"] < STABLE_PATH).all(axis=1)
 
 
-BOTH = ("expert", "naive")
-EXPERT = ("expert",)
-NAIVE = ("naive",)
-FULL, AAN, FIXED, MSAE, ASME, AUTO = (
-    *("full_teleoperation", "assist_as_needed", "fixed_assistance"),
-    *("msae", "asme", "mostly_autonomous"),
-)
+VERBS: Mapping[str, tuple[str, Callable[[pd.Series], pd.Series]]] = {
+    "is shorter than": (TIME, lambda ratio: ratio < 1),
+    "takes longer than": (TIME, lambda ratio: ratio > 1),
+    "takes as long as": (TIME, lambda ratio: (ratio - 1).abs() <= ALIKE_TIME),
+    "is more accurate than": (ERROR, lambda ratio: ratio < 1),
+    "is less accurate than": (ERROR, lambda ratio: ratio > 1),
+    "is as accurate as": (ERROR, lambda ratio: (ratio - 1).abs() <= ALIKE_ERROR),
+}
+"""What is compared between two paradigms, and what its ratio must be."""
 
+
+def compared(name: str, kinds: tuple[str, ...], first: str, verb: str, second: str) -> Claim:
+    """The claim that one paradigm compares with another as the verb says."""
+    metric, holds = VERBS[verb]
+    text = f"{NAMES[first]} {verb} {NAMES[second]}"
+    return Claim(name, text, kinds, lambda means: holds(means[metric][first] / means[metric][second]))
+
+
+BOTH, EXPERT, NAIVE = ("expert", "naive"), ("expert",), ("naive",)
 CLAIMS = (
-    Claim("auto_shortest", "Mostly Autonomous is the shortest of the six", BOTH, shortest),
-    Claim("auto_most_accurate", "Mostly Autonomous is the most accurate of the six", BOTH, most_accurate),
+    Claim("auto_shortest", "Mostly Autonomous is the shortest of the six", BOTH, best(TIME)),
+    Claim("auto_most_accurate", "Mostly Autonomous is the most accurate of the six", BOTH, best(ERROR)),
+    Claim("auto_error_not_zero", "The error of Mostly Autonomous is not zero", BOTH, error_not_zero),
     Claim(
-        "auto_error_not_zero",
-        "The error of Mostly Autonomous is not zero",
-        BOTH,
-        lambda means: means.error[AUTO] > NOT_ZERO,
+        "autonomy_shorter", f"MSAE, ASME and {NAMES[AUTO]} are shorter than {NAMES[FULL]}", BOTH, all_shorter
     ),
-    Claim(
-        "autonomy_shorter",
-        "MSAE, ASME and Mostly Autonomous are shorter than Full Teleoperation",
-        BOTH,
-        autonomy_shorter,
-    ),
-    Claim("gradual_time", "Each step of autonomy shortens the trial", BOTH, gradual("time")),
-    Claim("gradual_error", "Each step of autonomy places better", BOTH, gradual("error")),
-    Claim("asme_shorter", "ASME is shorter than MSAE", BOTH, better("time", ASME, MSAE)),
-    Claim("asme_more_accurate", "ASME is more accurate than MSAE", BOTH, better("error", ASME, MSAE)),
-    Claim(
-        "fixed_like_msae_time",
-        "Fixed Assistance takes as long as MSAE",
-        EXPERT,
-        alike("time", FIXED, MSAE, ALIKE_TIME),
-    ),
-    Claim(
-        "fixed_like_msae_error",
-        "Fixed Assistance is as accurate as MSAE",
-        EXPERT,
-        alike("error", FIXED, MSAE, ALIKE_ERROR),
-    ),
-    Claim("fixed_slower_msae", "Fixed Assistance takes longer than MSAE", NAIVE, better("time", MSAE, FIXED)),
-    Claim(
-        "fixed_less_accurate_msae",
-        "Fixed Assistance is less accurate than MSAE",
-        NAIVE,
-        better("error", MSAE, FIXED),
-    ),
-    Claim(
-        "aan_shorter_fixed",
-        "Assist-as-Needed is shorter than Fixed Assistance",
-        NAIVE,
-        better("time", AAN, FIXED),
-    ),
-    Claim(
-        "aan_more_accurate_fixed",
-        "Assist-as-Needed is more accurate than Fixed Assistance",
-        NAIVE,
-        better("error", AAN, FIXED),
-    ),
-    Claim(
-        "aan_like_full_time",
-        "Assist-as-Needed takes as long as Full Teleoperation",
-        EXPERT,
-        alike("time", AAN, FULL, ALIKE_TIME),
-    ),
-    Claim(
-        "aan_like_full_error",
-        "Assist-as-Needed is as accurate as Full Teleoperation",
-        EXPERT,
-        alike("error", AAN, FULL, ALIKE_ERROR),
-    ),
-    Claim(
-        "aan_not_felt",
-        "The force of Assist-as-Needed is hardly felt",
-        EXPERT,
-        lambda means: means.force[AAN] < NOT_FELT,
-    ),
-    Claim(
-        "aan_shorter_full",
-        "Assist-as-Needed is shorter than Full Teleoperation",
-        NAIVE,
-        better("time", AAN, FULL),
-    ),
-    Claim(
-        "aan_more_accurate_full",
-        "Assist-as-Needed is more accurate than Full Teleoperation",
-        NAIVE,
-        better("error", AAN, FULL),
-    ),
+    Claim("gradual_time", "Each step of autonomy shortens the trial", BOTH, gradual(TIME)),
+    Claim("gradual_error", "Each step of autonomy places better", BOTH, gradual(ERROR)),
+    compared("asme_shorter", BOTH, ASME, "is shorter than", MSAE),
+    compared("asme_more_accurate", BOTH, ASME, "is more accurate than", MSAE),
+    compared("fixed_like_msae_time", EXPERT, FIXED, "takes as long as", MSAE),
+    compared("fixed_like_msae_error", EXPERT, FIXED, "is as accurate as", MSAE),
+    compared("fixed_slower_msae", NAIVE, FIXED, "takes longer than", MSAE),
+    compared("fixed_less_accurate_msae", NAIVE, FIXED, "is less accurate than", MSAE),
+    compared("aan_shorter_fixed", NAIVE, AAN, "is shorter than", FIXED),
+    compared("aan_more_accurate_fixed", NAIVE, AAN, "is more accurate than", FIXED),
+    compared("aan_like_full_time", EXPERT, AAN, "takes as long as", FULL),
+    compared("aan_like_full_error", EXPERT, AAN, "is as accurate as", FULL),
+    Claim("aan_not_felt", "The force of Assist-as-Needed is hardly felt", EXPERT, not_felt),
+    compared("aan_shorter_full", NAIVE, AAN, "is shorter than", FULL),
+    compared("aan_more_accurate_full", NAIVE, AAN, "is more accurate than", FULL),
     Claim("stable", "No instability", BOTH, stable),
 )
 
+ALL = sorted(PARADIGMS)
 PAIR_CLAIMS = {
-    "expert_faster": "Experts are faster than naive users, mean over the paradigms",
-    "expert_more_accurate": "Experts place better than naive users, mean over the paradigms",
-    "expert_less_assisted": "Assist-as-Needed pushes experts less than naive users",
+    "expert_faster": ("Experts are faster than naive users, mean over the paradigms", TIME, ALL),
+    "expert_more_accurate": ("Experts place better than naive users, mean over the paradigms", ERROR, ALL),
+    "expert_less_assisted": ("Assist-as-Needed pushes experts less than naive users", FORCE, [AAN]),
 }
-"""Claims that compare one expert with one naive user, in each environment."""
+"""Claims that one expert has a smaller mean than one naive user, in each environment: words, of what."""
 
 ACROSS_CLAIM = "aan_gain_larger_simulated"
 """Naive users gain more from Assist-as-Needed over Fixed Assistance in the simulation than in reality."""
@@ -197,18 +140,19 @@ def operator_means(trials: pd.DataFrame) -> Means:
     ----------
     trials : pandas.DataFrame
         One kind of operator in one environment: columns operator, paradigm and the metrics of a trial.
+
+    Returns
+    -------
+    mapping of str to pandas.DataFrame
+        By metric; of the path the longest, not the mean.
     """
 
     def table(metric: str, how: Literal["mean", "max"] = "mean") -> pd.DataFrame:
         return trials.pivot_table(index="operator", columns="paradigm", values=metric, aggfunc=how)
 
-    return Means(
-        time=table("time_s"),
-        error=table("release_error_mm"),
-        force=table("assistance_n"),
-        path=table("path_m", "max"),
-        finished=table("finished"),
-    )
+    return {metric: table(metric) for metric in (TIME, ERROR, FORCE, "finished")} | {
+        "path_m": table("path_m", "max")
+    }
 
 
 def evaluate_claims(trials: pd.DataFrame) -> pd.DataFrame:
@@ -224,8 +168,35 @@ def evaluate_claims(trials: pd.DataFrame) -> pd.DataFrame:
     pandas.DataFrame
         Columns id (``<claim>_<kind>_<environment>``), claim, kind, environment, text, operator, holds.
     """
-    records = list(_operator_records(trials)) + list(_pair_records(trials))
-    return pd.concat([_frame(*record) for record in records], ignore_index=True)
+    pieces: list[pd.DataFrame] = []
+
+    def judge(claim: str, kind: str, environment: str, text: str, holds: ArrayLike) -> None:
+        labels = {"claim": claim, "kind": kind, "environment": environment, "text": text}
+        held = pd.DataFrame({**labels, "holds": np.asarray(holds, dtype=float)})
+        held.insert(0, "id", f"{claim}_{kind}_{environment}")
+        held.insert(5, "operator", held.index)
+        pieces.append(held)
+
+    means = {
+        (str(kind), str(environment)): operator_means(group)
+        for (kind, environment), group in trials.groupby(["kind", "environment"], sort=False)
+    }
+    for (kind, environment), table in means.items():
+        for claim in CLAIMS:
+            if kind in claim.kinds:
+                judge(claim.name, kind, environment, claim.text, claim.holds(table))
+    for environment in dict.fromkeys(environment for _, environment in means):
+        if ("expert", environment) in means and ("naive", environment) in means:
+            expert, naive = means["expert", environment], means["naive", environment]
+            for name, (text, metric, paradigms) in PAIR_CLAIMS.items():
+                means_of_both = (table[metric][paradigms].mean(axis=1) for table in (expert, naive))
+                judge(name, "pair", environment, text, lt(*means_of_both))
+    if ("naive", "simulated") in means and ("naive", "real") in means:
+        times = [means["naive", environment][TIME] for environment in ("simulated", "real")]
+        simulated, real = ((1 - time[AAN] / time[FIXED]).to_numpy() for time in times)
+        text = "Naive users gain more time from AAN over Fixed in the simulation"
+        judge(ACROSS_CLAIM, "naive", "both", text, simulated > real)
+    return pd.concat(pieces, ignore_index=True)
 
 
 def claim_probabilities(held: pd.DataFrame) -> pd.DataFrame:
@@ -248,54 +219,8 @@ def condition_probabilities(trials: pd.DataFrame) -> pd.DataFrame:
         As `claim_probabilities`, with the columns attitude, law and approach.
     """
     conditions = ["attitude", "law", "approach"]
-    pieces = [
-        claim_probabilities(evaluate_claims(group)).assign(
-            **dict(zip(conditions, map(str, condition), strict=True))
-        )
+    pieces = {
+        condition: claim_probabilities(evaluate_claims(group))
         for condition, group in trials.groupby(conditions, sort=False)
-    ]
-    return pd.concat(pieces, ignore_index=True)
-
-
-Record = tuple[str, str, str, str, NDArray[np.bool_]]
-
-
-def _operator_records(trials: pd.DataFrame) -> Iterator[Record]:
-    for (kind, environment), group in trials.groupby(["kind", "environment"], sort=False):
-        means = operator_means(group)
-        for claim in CLAIMS:
-            if kind in claim.kinds:
-                yield claim.name, str(kind), str(environment), claim.text, claim.holds(means).to_numpy(bool)
-
-
-def _pair_records(trials: pd.DataFrame) -> Iterator[Record]:
-    groups = trials.groupby(["environment", "kind"], sort=False)
-    means = {(str(place), str(kind)): operator_means(group) for (place, kind), group in groups}
-    environments = list(dict.fromkeys(environment for environment, _ in means))
-    for environment in environments:
-        if (environment, "expert") not in means or (environment, "naive") not in means:
-            continue
-        expert, naive = means[environment, "expert"], means[environment, "naive"]
-        held = {
-            "expert_faster": expert.time.mean(axis=1) < naive.time.mean(axis=1),
-            "expert_more_accurate": expert.error.mean(axis=1) < naive.error.mean(axis=1),
-            "expert_less_assisted": expert.force[AAN] < naive.force[AAN],
-        }
-        for name, text in PAIR_CLAIMS.items():
-            yield name, "pair", environment, text, held[name].to_numpy(bool)
-    if ("simulated", "naive") in means and ("real", "naive") in means:
-        gains = [means[name, "naive"].time for name in ("simulated", "real")]
-        simulated, real = ((1 - time[AAN] / time[FIXED]).to_numpy() for time in gains)
-        text = "Naive users gain more time from AAN over Fixed in the simulation"
-        yield ACROSS_CLAIM, "naive", "both", text, simulated > real
-
-
-def _frame(name: str, kind: str, environment: str, text: str, holds: NDArray[np.bool_]) -> pd.DataFrame:
-    labels = {
-        "id": f"{name}_{kind}_{environment}",
-        "claim": name,
-        "kind": kind,
-        "environment": environment,
-        "text": text,
     }
-    return pd.DataFrame({**labels, "operator": np.arange(len(holds)), "holds": holds.astype(float)})
+    return pd.concat(pieces, names=conditions).reset_index(conditions).reset_index(drop=True)

@@ -5,19 +5,20 @@ First as the paper did, with four individuals; then with a crowd, for effects wi
 Source: Stroppa et al., Section 5.4.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from pathlib import Path
+from itertools import product
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from soro_lib.checks import one_of
 from soro_lib.controllers.shared_control import PARADIGMS
-from soro_lib.papers.shared_control.experiments.simulation import TrialPlan, simulate
+from soro_lib.papers.shared_control.experiments.simulation import TrialPlan, person_plans, simulate
 from soro_lib.papers.shared_control.experiments.task import TaskSettings
-from soro_lib.papers.shared_control.world import ATTITUDES, POPULATIONS, Operator
+from soro_lib.papers.shared_control.world.people import ATTITUDES, POPULATIONS, Operator
 
 ENVIRONMENTS = ("simulated", "real")
 KINDS = ("expert", "naive")
@@ -40,8 +41,7 @@ def draw_operators(kind: str, count: int, seed: int, **changes: float) -> list[O
     ValueError
         If there is no such kind, or a parameter is out of bounds.
     """
-    if kind not in POPULATIONS:
-        raise ValueError(f"kind must be one of {tuple(POPULATIONS)}, got {kind!r}")
+    one_of("kind", kind, POPULATIONS)
     streams = (np.random.default_rng([seed, 1, KINDS.index(kind), person]) for person in range(count))
     return [replace(POPULATIONS[kind].draw(rng), **changes) for rng in streams]
 
@@ -52,9 +52,7 @@ def demonstration_plans(
     trials: int = TRIALS,
     attitude: str = "ignore",
     approach_height: float = 0.1,
-    kinds: Sequence[str] = KINDS,
-    environments: Sequence[str] = ENVIRONMENTS,
-    paradigms: Sequence[str] = tuple(PARADIGMS),
+    paradigms: Iterable[str] = PARADIGMS,
     **settings: Any,
 ) -> Iterator[TrialPlan]:
     """Every operator of every kind through every paradigm in every environment.
@@ -73,37 +71,22 @@ def demonstration_plans(
         To the guidance force.
     approach_height : float
         0.1 m: from above, as the paper says; 0: in a straight line.
-    kinds, environments, paradigms : sequence of str
+    paradigms : iterable of str
     **settings
         Passed on to `TaskSettings` (force_law, detection_error, ...).
     """
     changes = {**ATTITUDES[attitude], "approach_height": approach_height}
-    for environment in environments:
-        place = ENVIRONMENTS.index(environment)
-        for kind in kinds:
+    for place, environment in enumerate(ENVIRONMENTS):
+        for group, kind in enumerate(KINDS):
             people = draw_operators(kind, operators, seed + 1000 * place, **changes)
             for name in paradigms:
                 setting = TaskSettings(PARADIGMS[name], environment=environment, **settings)  # type: ignore[arg-type]
-                for person, operator in enumerate(people):
-                    for trial in range(trials):
-                        chance = (seed, 2, place, KINDS.index(kind), person, trial)
-                        labels = {
-                            "environment": environment,
-                            "kind": kind,
-                            "paradigm": name,
-                            "operator": person,
-                            "trial": trial,
-                        }
-                        yield TrialPlan(setting, operator, chance, labels)
+                labels = {"environment": environment, "kind": kind, "paradigm": name}
+                yield from person_plans(setting, people, (seed, 2, place, group), trials, labels)
 
 
 def run_demonstrations(
-    operators: int,
-    seed: int,
-    jobs: int = 1,
-    scheduler: Any = None,
-    store: str | Path | None = None,
-    **options: Any,
+    operators: int, seed: int, jobs: int = 1, scheduler: Any = None, store: Any = None, **options: Any
 ) -> pd.DataFrame:
     """Simulate the demonstrations; one line per trial. Options as in `demonstration_plans` and `simulate`."""
     plans = demonstration_plans(operators, seed, **options)
@@ -126,28 +109,21 @@ def run_conditions(operators: int, seed: int, trials: int = 2, **run: Any) -> pd
         As `run_demonstrations`, with the columns attitude, law and approach before.
     """
 
+    free = {"paradigms": [name for name in PARADIGMS if name not in GUIDED]}
+    forces = list(product(ATTITUDES, ("printed", "program")))
+    cases: dict[tuple[str, str], dict[str, Any]] = {("any", "any"): free}
+    for attitude, law in forces:
+        cases[attitude, law] = {"paradigms": GUIDED, "attitude": attitude, "force_law": law}
+
     def plans() -> Iterator[TrialPlan]:
-        for approach, height in APPROACHES.items():
-            free = [name for name in PARADIGMS if name not in GUIDED]
-            cases: list[tuple[str, str, Sequence[str]]] = [("any", "any", free)]
-            cases += [(attitude, law, GUIDED) for attitude in ATTITUDES for law in ("printed", "program")]
-            for attitude, law, paradigms in cases:
-                options = {"attitude": "ignore", "force_law": "printed"}
-                if attitude != "any":
-                    options = {"attitude": attitude, "force_law": law}
-                condition = {"attitude": attitude, "law": law, "approach": approach}
-                for plan in demonstration_plans(
-                    operators, seed, trials, approach_height=height, paradigms=paradigms, **options
-                ):
-                    yield replace(plan, labels={**condition, **plan.labels})
+        for (approach, height), ((attitude, law), case) in product(APPROACHES.items(), cases.items()):
+            condition = {"attitude": attitude, "law": law, "approach": approach}
+            for plan in demonstration_plans(operators, seed, trials, approach_height=height, **case):
+                yield replace(plan, labels={**condition, **plan.labels})
 
     table = simulate(plans(), **run)
     unforced = table[table["attitude"] == "any"]
-    copies = [
-        unforced.assign(attitude=attitude, law=law)
-        for attitude in ATTITUDES
-        for law in ("printed", "program")
-    ]
+    copies = [unforced.assign(attitude=attitude, law=law) for attitude, law in forces]
     return pd.concat([*copies, table[table["attitude"] != "any"]], ignore_index=True)
 
 
@@ -161,7 +137,7 @@ RESULTS = ("time_s", "release_error_mm", "path_m", "assistance_n")
 CELLS = ["environment", "kind", "paradigm"]
 
 
-def summary(trials: pd.DataFrame, resamples: int = 2000, seed: int = 0) -> pd.DataFrame:
+def summary(trials: pd.DataFrame, resamples: int = 2000) -> pd.DataFrame:
     """Mean of each metric over people, with a 95 % bootstrap interval over people.
 
     Time-outs count with their full time; errors are those of finished trials.
@@ -172,31 +148,27 @@ def summary(trials: pd.DataFrame, resamples: int = 2000, seed: int = 0) -> pd.Da
         Columns environment, kind, paradigm, metric, mean, low, high, finished (share of trials).
     """
     people = trials.groupby([*CELLS, "operator"], sort=False)[list(RESULTS)].mean()
-    finished = trials.groupby(CELLS, sort=False)["finished"].mean().to_dict()
-    rows = _over_people(people, resamples, seed)
-    return rows.assign(
-        finished=[finished[cell] for cell in zip(*(rows[name] for name in CELLS), strict=True)]
-    )
+    finished = trials.groupby(CELLS, sort=False)["finished"].mean()
+    return _over_people(people, resamples).join(finished, on=CELLS)
 
 
-def effects(
-    trials: pd.DataFrame, reference: str = "full_teleoperation", resamples: int = 2000, seed: int = 0
-) -> pd.DataFrame:
-    """What each paradigm changes against a reference, person by person, with 95 % bootstrap intervals.
+def effects(trials: pd.DataFrame, resamples: int = 2000) -> pd.DataFrame:
+    """What each paradigm changes against full teleoperation, person by person, with 95 % bootstrap intervals.
 
     The same people meet the same chance under every paradigm, so the differences are paired.
 
     Returns
     -------
     pandas.DataFrame
-        Columns environment, kind, paradigm, metric, mean, low, high: paradigm less reference.
+        Columns environment, kind, paradigm, metric, mean, low, high: paradigm less full teleoperation.
     """
     people = trials.groupby([*CELLS, "operator"], sort=False)[list(RESULTS)].mean().reset_index()
     keys = ["environment", "kind", "operator"]
-    base = people[people["paradigm"] == reference].set_index(keys)[list(RESULTS)]
-    others = people[people["paradigm"] != reference].set_index([*CELLS, "operator"])
+    reference = people["paradigm"] == "full_teleoperation"
+    base = people[reference].set_index(keys)[list(RESULTS)]
+    others = people[~reference].set_index([*CELLS, "operator"])
     aligned = base.reindex(others.reset_index("paradigm").index).to_numpy()
-    return _over_people(others - aligned, resamples, seed)
+    return _over_people(others.sub(aligned), resamples)
 
 
 LARGEST_DRAW = 250_000
@@ -219,14 +191,13 @@ def resampled_means(
     return means
 
 
-def _over_people(people: pd.DataFrame, resamples: int, seed: int) -> pd.DataFrame:
+def _over_people(people: pd.DataFrame, resamples: int) -> pd.DataFrame:
     """Mean and bootstrap interval over the operators of every cell."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     rows = []
     for cell, group in people.groupby(CELLS, sort=False):
         values = group.to_numpy()
         low, high = np.nanpercentile(resampled_means(values, resamples, rng), [2.5, 97.5], axis=0)
         for index, metric in enumerate(group.columns):
-            row = {**dict(zip(CELLS, cell, strict=True)), "metric": metric}
-            rows.append({**row, "mean": np.nanmean(values[:, index]), "low": low[index], "high": high[index]})
-    return pd.DataFrame(rows)
+            rows.append((*cell, metric, np.nanmean(values[:, index]), low[index], high[index]))
+    return pd.DataFrame(rows, columns=[*CELLS, "metric", "mean", "low", "high"])

@@ -8,8 +8,7 @@ Source: Stroppa et al., Section 5.3 and Table 2.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import combinations, product
-from pathlib import Path
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -19,10 +18,11 @@ from scipy.stats import f as f_distribution
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import AnovaRM, anova_lm
 
+from soro_lib.checks import one_of
 from soro_lib.controllers.shared_control import PARADIGMS
-from soro_lib.papers.shared_control.experiments.simulation import TrialPlan, simulate
+from soro_lib.papers.shared_control.experiments.simulation import TrialPlan, person_plans, simulate
 from soro_lib.papers.shared_control.experiments.task import TaskSettings
-from soro_lib.papers.shared_control.world import Operator
+from soro_lib.papers.shared_control.world.people import Operator
 
 FACTORS: Mapping[str, tuple[float, float]] = {
     "f_max": (3.0, 7.0),
@@ -50,19 +50,19 @@ def stiffness_rate(delta: float, k_max: float, reading: DeltaReading) -> float:
         If the reading has no such name.
     """
     rates = {"seconds": k_max / delta, "per_second": delta, "per_sample": 100.0 * delta}
-    if reading not in rates:
-        raise ValueError(f"reading must be one of {tuple(rates)}, got {reading!r}")
+    one_of("reading", reading, rates)
     return rates[reading]
 
 
-def factorial_plans(
+def run_factorial(
     operators: list[Operator],
     seed: int,
     repetitions: int = 3,
     reading: DeltaReading = "seconds",
-    **settings: Any,
-) -> Iterator[TrialPlan]:
-    """Every combination of the levels, for each repetition of each operator.
+    force_law: Literal["printed", "program"] = "printed",
+    **run: Any,
+) -> pd.DataFrame:
+    """Simulate the tuning study: every combination of the levels, for each repetition of each operator.
 
     Every trial has a random stream of its own, as a person never repeats himself: streams shared over the
     settings would leave the analysis hardly any error to divide by.
@@ -75,48 +75,35 @@ def factorial_plans(
     repetitions : int
     reading : str
         Of Delta.
-    **settings
-        Passed on to `TaskSettings` (environment, force_law, ...).
+    force_law : {"printed", "program"}
+    **run
+        jobs, scheduler or store of `simulate`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One line per trial: the levels (0 low, 1 high), operator, repetition and the metrics.
     """
-    names = list(FACTORS)
-    for levels in product((0, 1), repeat=len(names)):
-        values = {name: FACTORS[name][level] for name, level in zip(names, levels, strict=True)}
-        setting = TaskSettings(
-            PARADIGMS["assist_as_needed"],
-            assist_as_needed={
+
+    def plans() -> Iterator[TrialPlan]:
+        for levels in product((0, 1), repeat=len(FACTORS)):
+            labels = dict(zip(FACTORS, levels, strict=True))
+            values = {name: FACTORS[name][level] for name, level in labels.items()}
+            parameters = {
                 "maximum_force": values["f_max"],
                 "maximum_stiffness": values["k_max"],
                 "stiffness_rate": stiffness_rate(values["delta"], values["k_max"], reading),
                 "steady_delay": values["xi_s"],
                 "approach_delay": values["xi_c"],
                 "away_delay": values["xi_a"],
-                **settings.get("assist_as_needed", {}),
-            },
-            **{key: value for key, value in settings.items() if key != "assist_as_needed"},
-        )
-        for person, operator in enumerate(operators):
-            for repetition in range(repetitions):
-                labels = dict(zip(names, levels, strict=True))
-                labels |= {"operator": person, "repetition": repetition}
-                yield TrialPlan(setting, operator, (seed, 3, person, repetition, *levels), labels)
+            }
+            paradigm = PARADIGMS["assist_as_needed"]
+            setting = TaskSettings(paradigm, force_law=force_law, assist_as_needed=parameters)
+            yield from person_plans(
+                setting, operators, (seed, 3), repetitions, labels, setting=levels, counted="repetition"
+            )
 
-
-def run_factorial(
-    operators: list[Operator],
-    seed: int,
-    repetitions: int = 3,
-    reading: DeltaReading = "seconds",
-    jobs: int = 1,
-    scheduler: Any = None,
-    store: str | Path | None = None,
-    **settings: Any,
-) -> pd.DataFrame:
-    """Simulate the tuning study; one line per trial with the levels (0 low, 1 high) and the metrics.
-
-    Parameters as in `factorial_plans` and `simulate`.
-    """
-    plans = factorial_plans(operators, seed, repetitions, reading, **settings)
-    return simulate(plans, jobs=jobs, scheduler=scheduler, chunk=96, store=store)
+    return simulate(plans(), chunk=96, **run)
 
 
 # --- Analysis of one operator's study ------------------------------------------------------------
@@ -152,17 +139,10 @@ def plain_anova(trials: pd.DataFrame, response: str) -> pd.DataFrame:
     _check_balanced(trials)
     factors = " + ".join(f"C({name}, Sum)" for name in FACTORS)
     fitted = ols(f"{response} ~ ({factors}) ** 2", data=trials).fit()
-    table = anova_lm(fitted, typ=2).drop(index="Residual")
+    table = anova_lm(fitted, typ=2).drop(index="Residual").rename(columns={"F": "f", "PR(>F)": "p"})
     effects = [name.replace("C(", "").replace(", Sum)", "") for name in table.index]
-    return pd.DataFrame(
-        {
-            "effect": effects,
-            "f": table["F"].to_numpy(),
-            "df": table["df"].to_numpy(dtype=int),
-            "df_error": int(fitted.df_resid),
-            "p": table["PR(>F)"].to_numpy(),
-        }
-    )
+    table = table.assign(effect=effects, df=table["df"].astype(int), df_error=int(fitted.df_resid))
+    return table[["effect", "f", "df", "df_error", "p"]].reset_index(drop=True)
 
 
 def _check_balanced(trials: pd.DataFrame) -> None:
@@ -180,10 +160,9 @@ def _check_balanced(trials: pd.DataFrame) -> None:
 
 @dataclass(frozen=True)
 class Contrast:
-    """A difference of means: its words, the sets of levels whose means are subtracted, the claimed sign."""
+    """A difference of means: of what, the sets of levels whose means are subtracted, the claimed sign."""
 
     name: str
-    text: str
     response: str
     high: Mapping[str, int]
     low: Mapping[str, int]
@@ -191,20 +170,13 @@ class Contrast:
 
 
 CONTRASTS = (
-    Contrast("fmax_time", "f_MAX high", "time_s", {"f_max": 1}, {"f_max": 0}, -1.0),
-    Contrast("fmax_path", "f_MAX high", "path_m", {"f_max": 1}, {"f_max": 0}, -1.0),
-    Contrast("fmax_assistance", "f_MAX high", "assistance_n", {"f_max": 1}, {"f_max": 0}, 1.0),
-    Contrast("xi_time", "xi_A and xi_S low", "time_s", {"xi_a": 0, "xi_s": 0}, {"xi_a": 1, "xi_s": 1}, -1.0),
-    Contrast("xi_a_path", "xi_A low", "path_m", {"xi_a": 0}, {"xi_a": 1}, -1.0),
-    Contrast("xi_s_path", "xi_S low", "path_m", {"xi_s": 0}, {"xi_s": 1}, -1.0),
-    Contrast(
-        "kmax_assistance",
-        "k_MAX low at xi_S high",
-        "assistance_n",
-        {"k_max": 0, "xi_s": 1},
-        {"k_max": 1, "xi_s": 1},
-        1.0,
-    ),
+    Contrast("fmax_time", "time_s", {"f_max": 1}, {"f_max": 0}, -1.0),
+    Contrast("fmax_path", "path_m", {"f_max": 1}, {"f_max": 0}, -1.0),
+    Contrast("fmax_assistance", "assistance_n", {"f_max": 1}, {"f_max": 0}, 1.0),
+    Contrast("xi_time", "time_s", {"xi_a": 0, "xi_s": 0}, {"xi_a": 1, "xi_s": 1}, -1.0),
+    Contrast("xi_a_path", "path_m", {"xi_a": 0}, {"xi_a": 1}, -1.0),
+    Contrast("xi_s_path", "path_m", {"xi_s": 0}, {"xi_s": 1}, -1.0),
+    Contrast("kmax_assistance", "assistance_n", {"k_max": 0, "xi_s": 1}, {"k_max": 1, "xi_s": 1}, 1.0),
 )
 """The effects that the paper reports, in its signs."""
 
@@ -218,7 +190,7 @@ def contrast_samples(trials: pd.DataFrame, contrast: Contrast) -> NDArray[np.flo
 def interaction_samples(trials: pd.DataFrame, response: str, first: str, second: str) -> NDArray[np.float64]:
     """Half the difference of the first factor's effect between the levels of the second, as above."""
     cells = {
-        levels: _cell_means(trials, response, dict(zip((first, second), levels, strict=True)))
+        levels: _cell_means(trials, response, {first: levels[0], second: levels[1]})
         for levels in product((0, 1), repeat=2)
     }
     return ((cells[1, 1] - cells[0, 1] - cells[1, 0] + cells[0, 0]) / 2).to_numpy()
@@ -239,15 +211,9 @@ def implied_trial_deviation(effect: float, f: float, trials_per_cell: int = 32) 
     return float(abs(effect) / np.sqrt(f) * np.sqrt(3 * trials_per_cell / 2))
 
 
-def printed_p_value(f: float, df: int = 1, df_error: int = 2) -> float:
+def printed_p_value(f: Any, df: int = 1, df_error: int = 2) -> Any:
     """Probability of a larger F."""
-    return float(f_distribution.sf(f, df, df_error))
-
-
-def expected_false_positives(responses: int = len(RESPONSES), level: float = 0.05) -> float:
-    """Effects that would pass by chance among main and two-way effects of all responses, uncorrected."""
-    effects = len(FACTORS) + len(list(combinations(FACTORS, 2)))
-    return level * effects * responses
+    return f_distribution.sf(f, df, df_error)
 
 
 def _cell_means(trials: pd.DataFrame, response: str, levels: Mapping[str, int]) -> pd.DataFrame:

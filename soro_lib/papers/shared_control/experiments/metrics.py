@@ -4,7 +4,9 @@ Source: Stroppa et al., Section 5.2 and Eqs. (9)-(11).
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from soro_lib.checks import finite, increasing
 
 
 def trajectory_length(tips: ArrayLike) -> float:
@@ -15,7 +17,7 @@ def trajectory_length(tips: ArrayLike) -> float:
     tips : array_like
         (n, 3) tip positions [m], in order.
     """
-    return float(np.linalg.norm(np.diff(_points("tips", tips), axis=0), axis=1).sum())
+    return float(np.linalg.norm(np.diff(finite("tips", tips, ("n", 3)), axis=0), axis=1).sum())
 
 
 def mean_assistance(forces: ArrayLike, times: ArrayLike) -> float:
@@ -33,12 +35,9 @@ def mean_assistance(forces: ArrayLike, times: ArrayLike) -> float:
     ValueError
         If the times do not increase or are not as many as the forces.
     """
-    norms = np.linalg.norm(_points("forces", forces), axis=1)
-    moments = np.asarray(times, dtype=float)
-    periods = np.diff(moments, prepend=0.0)
-    if moments.shape != norms.shape or np.any(periods <= 0):
-        raise ValueError(f"times must be {len(norms)} increasing numbers above 0, got shape {moments.shape}")
-    return float(norms @ periods / moments[-1])
+    norms = np.linalg.norm(finite("forces", forces, ("n", 3)), axis=1)
+    moments = increasing("times", np.concatenate([[0.0], times]), (len(norms) + 1,))
+    return float(norms @ np.diff(moments) / moments[-1])
 
 
 def placement_error(items: ArrayLike, targets: ArrayLike) -> float:
@@ -49,16 +48,5 @@ def placement_error(items: ArrayLike, targets: ArrayLike) -> float:
     items, targets : array_like
         (n, 3) positions [m], item i belongs on target i.
     """
-    offsets = _points("items", items) - _points("targets", targets)
+    offsets = finite("items", items, ("n", 3)) - finite("targets", targets, ("n", 3))
     return float(np.linalg.norm(offsets[:, :2], axis=1).mean())
-
-
-def _points(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    points = np.asarray(value, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
-        raise ValueError(f"{name} must have shape (n, 3) with n >= 1, got {points.shape}")
-    if not np.all(np.isfinite(points)):
-        raise ValueError(
-            f"{name} must be finite, row {int(np.argmin(np.isfinite(points).all(axis=1)))} is not"
-        )
-    return points

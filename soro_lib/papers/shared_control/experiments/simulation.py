@@ -7,7 +7,7 @@ machines.
 
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -19,8 +19,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from soro_lib.checks import Vector
-from soro_lib.controllers.shared_control.goal_selection import LIFTING_EMPTY
+from soro_lib.checks import positive
 from soro_lib.controllers.shared_control.guidance import distance_to_goal
 from soro_lib.jit import inlined
 from soro_lib.papers.shared_control.experiments.finished_chunks import chunk_path, read_chunk, write_chunk
@@ -30,20 +29,18 @@ from soro_lib.papers.shared_control.experiments.task import (
     TaskSettings,
     TaskState,
     delivered,
-    task_memory,
+    operator_view,
     task_start,
     task_step,
 )
-from soro_lib.papers.shared_control.world import EXPERT, Operator
 from soro_lib.papers.shared_control.world.hand import hand_command
 from soro_lib.papers.shared_control.world.loop import (
     OperatorState,
-    View,
     operator_start,
     operator_step,
     picture_buffer,
 )
-from soro_lib.papers.shared_control.world.plant import NOTHING, SAMPLE_TIME
+from soro_lib.papers.shared_control.world.people import EXPERT, SAMPLE_TIME, Operator
 
 TIME_LIMIT = 240.0
 """Time after which a trial is given up [s]."""
@@ -52,17 +49,8 @@ CHUNK = 250
 """Trials per task handed to a worker."""
 
 METRICS = (
-    "time_s",
-    "path_m",
-    "assistance_n",
-    "peak_force_n",
-    "release_error_mm",
-    "placement_error_mm",
-    "finished",
-    "item1_time_s",
-    "item2_time_s",
-    "item1_error_mm",
-    "item2_error_mm",
+    *("time_s", "path_m", "assistance_n", "peak_force_n", "release_error_mm", "placement_error_mm"),
+    *("finished", "item1_time_s", "item2_time_s", "item1_error_mm", "item2_error_mm"),
 )
 """Columns of a trial: T, L and H of the paper, the error of Section 5.2 (tip at release), P of Eq. (11)
 (item in the end), and time and release error of each item for Fig. 8."""
@@ -96,14 +84,24 @@ class TrialPlan:
     labels: Mapping[str, Any] = field(default_factory=dict)
 
 
-@inlined
-def next_place(task: TaskRule, state: TaskState, items: NDArray[np.float64]) -> Vector:
-    """Where the operator wants to go: the target of the item in the gripper, else the next item."""
-    if state.gripper.item != NOTHING:
-        return task.targets[state.gripper.item]
-    following = state.goal.item + 1 if state.goal.phase == LIFTING_EMPTY else state.goal.item
-    item = min(following, len(items) - 1)
-    return (items[item, 0], items[item, 1], items[item, 2])
+def person_plans(
+    settings: TaskSettings,
+    people: Sequence[Operator],
+    stream: Sequence[int],
+    trials: int,
+    labels: Mapping[str, Any],
+    setting: Sequence[int] = (),
+    counted: str = "trial",
+) -> Iterator[TrialPlan]:
+    """Every person for a few trials under one setting.
+
+    Chance depends on ``stream``, person, trial and, where given, ``setting``: settings that share them meet
+    the same chance. The labels gain operator and trial (or what ``counted`` says).
+    """
+    for person, operator in enumerate(people):
+        for trial in range(trials):
+            chance = (*stream, person, trial, *setting)
+            yield TrialPlan(settings, operator, chance, {**labels, "operator": person, counted: trial})
 
 
 @inlined
@@ -139,9 +137,7 @@ def play(
 ) -> TaskState:
     """Let the operator work until the last item is placed or the time is up; ``trace`` may have no lines."""
     while state.sample < samples and not delivered(task, state):
-        wanted = next_place(task, state, memory.items)
-        held = state.gripper.item != NOTHING
-        view = View(state.plant.tip, state.desired, wanted, state.force, held, task.automation)
+        view = operator_view(task, state, memory.items)
         human = operator_step(operator, human, pictures, view, rng)
         command = hand_command(human.hand)
         decision = human.decision
@@ -168,20 +164,11 @@ def play_trial(
     """
     rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(plan.seed)))
     start = plan.settings.scene.start
-    memory = task_memory(rule, plan.settings.scene)
+    first, memory = task_start(rule, start)
     operator = plan.operator.rule()
+    human, pictures = operator_start(start), picture_buffer(operator, start)
     run = _compiled_play if compiled else play
-    state = run(
-        rule,
-        task_start(rule, start),
-        memory,
-        operator,
-        operator_start(start),
-        picture_buffer(operator, start),
-        rng,
-        samples,
-        trace,
-    )
+    state = run(rule, first, memory, operator, human, pictures, rng, samples, trace)
     return state, memory
 
 
@@ -206,9 +193,7 @@ def simulate_chunk(plans: Sequence[TrialPlan], time_limit: float = TIME_LIMIT) -
     rules: dict[int, TaskRule] = {}
     table = np.empty((len(plans), len(METRICS)))
     for line, plan in zip(table, plans, strict=True):
-        if id(plan.settings) not in rules:
-            rules[id(plan.settings)] = plan.settings.rule()
-        rule = rules[id(plan.settings)]
+        rule = rules.get(id(plan.settings)) or rules.setdefault(id(plan.settings), plan.settings.rule())
         line[:] = trial_metrics(rule, *play_trial(plan, rule, samples, no_trace))
     return table
 
@@ -250,72 +235,48 @@ def simulate(
     ValueError
         If the time limit is not positive, the chunk holds no trial, or a plan is out of bounds.
     """
-    if not time_limit > 0:
-        raise ValueError(f"time_limit must be above 0, got {time_limit!r}")
-    if chunk < 1:
-        raise ValueError(f"chunk must be at least 1, got {chunk!r}")
+    positive("time_limit", time_limit)
+    positive("chunk", chunk)
     labels: dict[str, list[Any]] = {}
     places: list[Path | None] = []
     metrics = array("d")
 
     def tasks() -> Iterator[Any]:
-        for piece in _chunks(plans, chunk):
+        remaining = iter(plans)
+        while piece := list(islice(remaining, chunk)):
             for name in piece[0].labels:
                 labels.setdefault(name, []).extend(plan.labels[name] for plan in piece)
-            place = None if store is None else _place(store, piece, time_limit)
+            # Labels do not enter: they only name the numbers.
+            inputs = (time_limit, *((plan.settings, plan.operator, plan.seed) for plan in piece))
+            place = None if store is None else chunk_path(store, inputs)
             table = None if place is None else read_chunk(place)
             places.append(place if table is None else None)
-            yield joblib.delayed(simulate_chunk)(piece, time_limit) if table is None else _finished(table)
+            if table is None:
+                yield joblib.delayed(simulate_chunk)(piece, time_limit)
+            else:  # hand on the chunk of an earlier run, so that the chunks stay in order
+                yield joblib.delayed(np.asarray)(table)
 
-    with _backend(scheduler):
-        parallel = joblib.Parallel(n_jobs=-1 if scheduler is not None else jobs, return_as="generator")
+    with ExitStack() as backend:
+        if scheduler is None:
+            backend.enter_context(joblib.parallel_config(backend="threading"))
+        else:
+            from distributed import Client
+
+            client = backend.enter_context(Client(scheduler)) if isinstance(scheduler, str) else scheduler
+            backend.enter_context(joblib.parallel_config(backend="dask", client=client))
+        parallel = joblib.Parallel(n_jobs=jobs if scheduler is None else -1, return_as="generator")
         for number, table in enumerate(parallel(tasks())):
             if (place := places[number]) is not None:
                 write_chunk(place, table)
             metrics.frombytes(table.tobytes())
     columns = {name: _column(labels.pop(name)) for name in list(labels)}
-    values = np.frombuffer(metrics).reshape(-1, len(METRICS))
-    return pd.concat([pd.DataFrame(columns), pd.DataFrame(values, columns=list(METRICS), copy=False)], axis=1)
-
-
-def _chunks(plans: Iterable[TrialPlan], size: int) -> Iterator[list[TrialPlan]]:
-    """Cut the plans into lists."""
-    remaining = iter(plans)
-    while piece := list(islice(remaining, size)):
-        yield piece
-
-
-def _place(store: str | Path, piece: Sequence[TrialPlan], time_limit: float) -> Path:
-    """File of a chunk; labels do not enter, they only name the numbers."""
-    return chunk_path(store, (time_limit, *((plan.settings, plan.operator, plan.seed) for plan in piece)))
-
-
-def _finished(table: NDArray[np.float64]) -> Any:
-    """A task that hands on a chunk of an earlier run, so that the chunks stay in order."""
-    return joblib.delayed(np.asarray)(table)
+    values = pd.DataFrame(np.frombuffer(metrics).reshape(-1, len(METRICS)), columns=list(METRICS), copy=False)
+    return pd.concat([pd.DataFrame(columns), values], axis=1)
 
 
 def _column(values: list[Any]) -> Any:
     """A column of labels; text as categories, a byte each."""
-    if not isinstance(values[0], str):
-        return values
-    names = sorted(set(values))
-    codes = {name: code for code, name in enumerate(names)}
-    return pd.Categorical.from_codes([codes[value] for value in values], pd.Index(names))
-
-
-@contextmanager
-def _backend(scheduler: Any) -> Iterator[None]:
-    """Threads in this process, or the workers of a Dask scheduler."""
-    if scheduler is None:
-        with joblib.parallel_config(backend="threading"):
-            yield
-        return
-    from distributed import Client
-
-    connection = Client(scheduler) if isinstance(scheduler, str) else nullcontext(scheduler)
-    with connection as client, joblib.parallel_config(backend="dask", client=client):
-        yield
+    return pd.Categorical(values) if isinstance(values[0], str) else values
 
 
 def trace_trial(plan: TrialPlan, time_limit: float = TIME_LIMIT) -> pd.DataFrame:

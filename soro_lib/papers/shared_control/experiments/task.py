@@ -7,58 +7,24 @@ Source: Stroppa et al., Sections 3 to 5.1; the scene is that of the authors' pub
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import Vector, vector
-from soro_lib.controllers.shared_control.assist_as_needed import (
-    ASSIST_START,
-    MOTIONS,
-    AssistAsNeeded,
-    AssistRule,
-    AssistState,
-    assist_step,
-)
-from soro_lib.controllers.shared_control.fixed_assistance import (
-    FIXED_START,
-    FixedAssistance,
-    FixedRule,
-    FixedState,
-    fixed_step,
-)
-from soro_lib.controllers.shared_control.goal_selection import (
-    END,
-    LIFTING_EMPTY,
-    PHASES,
-    PLACING,
-    GoalRule,
-    GoalSelection,
-    GoalState,
-    goal_step,
-)
+from soro_lib.checks import Vector, numbers, one_of, vector
+from soro_lib.controllers.shared_control import assist_as_needed as aan
+from soro_lib.controllers.shared_control import fixed_assistance, goal_selection
+from soro_lib.controllers.shared_control.goal_selection import END, LIFTING_EMPTY, PLACING
 from soro_lib.controllers.shared_control.guidance import distance_to_goal, guidance_force, hooke_magnitude
 from soro_lib.controllers.shared_control.paradigms import ASSISTANCES, PARADIGMS, Paradigm, desired_position
 from soro_lib.jit import inlined
-from soro_lib.papers.shared_control.world.plant import (
-    NOTHING,
-    REAL_GRIPPER,
-    SAMPLE_TIME,
-    SIMULATED_GRIPPER,
-    GripperRule,
-    GripperState,
-    PlantParameters,
-    PlantRule,
-    PlantState,
-    command_buffer,
-    gripper_step,
-    plant_start,
-    plant_step,
-    real_arm,
-    tracked_tip,
-)
+from soro_lib.papers.shared_control.world import plant as arm
+from soro_lib.papers.shared_control.world.loop import View
+from soro_lib.papers.shared_control.world.people import SAMPLE_TIME
+from soro_lib.papers.shared_control.world.vectors import ZERO, delay_line, difference, row, size
 
 UNASSISTED, AS_NEEDED, FIXED = range(len(ASSISTANCES))
 
@@ -99,15 +65,13 @@ class TaskSettings:
     force_law : {"printed", "program"}
         Unit direction and th_D = 30 mm as printed; or the authors' program: direction not normalised, th_D =
         50 mm, its own counter tau, fixed assistance without damper and silent below 30 mm.
-    assist_as_needed, fixed_assistance : mapping
-        Parameters that differ from the defaults of `AssistAsNeeded` and `FixedAssistance`.
+    assist_as_needed : mapping
+        Parameters that differ from the defaults of `AssistAsNeeded`.
     scene : Scene
     detection_error : tuple of float
         Error of the goals that the machine is told, added to items and targets alike [m].
     lift : bool or None
         Whether the machine lifts between goals; None: as the paradigm does.
-    printed_goal_machine : bool
-        Without the mends of `GoalSelection`.
     tracking_noise : float or None
         Of the real arm's tracked tip [m]; None: as in `real_arm`.
     """
@@ -115,19 +79,15 @@ class TaskSettings:
     paradigm: Paradigm = PARADIGMS["full_teleoperation"]
     environment: Literal["simulated", "real"] = "simulated"
     force_law: Literal["printed", "program"] = "printed"
-    assist_as_needed: dict[str, object] = field(default_factory=dict)
-    fixed_assistance: dict[str, object] = field(default_factory=dict)
+    assist_as_needed: Mapping[str, object] = field(default_factory=dict)
     scene: Scene = Scene()
     detection_error: Vector = (0.0, 0.0, 0.0)
     lift: bool | None = None
-    printed_goal_machine: bool = False
     tracking_noise: float | None = None
 
     def __post_init__(self) -> None:
-        if self.environment not in ("simulated", "real"):
-            raise ValueError(f'environment must be "simulated" or "real", got {self.environment!r}')
-        if self.force_law not in ("printed", "program"):
-            raise ValueError(f'force_law must be "printed" or "program", got {self.force_law!r}')
+        one_of("environment", self.environment, ("simulated", "real"))
+        one_of("force_law", self.force_law, ("printed", "program"))
 
     def rule(self) -> "TaskRule":
         """Plain numbers for the compiled rules.
@@ -139,18 +99,17 @@ class TaskSettings:
         """
         program = self.force_law == "program"
         as_needed = {"near_distance": 0.05, "counter": "program"} if program else {}
+        assist = aan.AssistAsNeeded(**{**as_needed, **self.assist_as_needed})  # type: ignore[arg-type]
         fixed = {"near_distance": 0.03, "damping": 0.0} if program else {}
-        assist = AssistAsNeeded(**{**as_needed, **self.assist_as_needed})  # type: ignore[arg-type]
-        spring = FixedAssistance(**{**fixed, **self.fixed_assistance})  # type: ignore[arg-type]
+        spring = fixed_assistance.FixedAssistance(**fixed)  # type: ignore[arg-type]
         real = self.environment == "real"
-        plant = real_arm(self.tracking_noise) if real else PlantParameters()
+        plant = arm.real_arm(self.tracking_noise) if real else arm.PlantParameters()
         error = np.array(vector("detection_error", self.detection_error))
-        goals = GoalSelection(
+        goals = goal_selection.GoalSelection(
             np.array(self.scene.items) + error,
             np.array(self.scene.targets) + error,
             lift=self.paradigm.lifts if self.lift is None else self.lift,
             reach=plant.maximum_length,
-            printed=self.printed_goal_machine,
         )
         return TaskRule(
             goals=goals.rule,
@@ -161,7 +120,7 @@ class TaskSettings:
             fixed=spring.rule,
             window=len(spring.window),
             plant=plant.rule(),
-            gripper=REAL_GRIPPER if real else SIMULATED_GRIPPER,
+            gripper=arm.REAL_GRIPPER if real else arm.SIMULATED_GRIPPER,
             assistance=ASSISTANCES.index(self.paradigm.assistance),
             automation=vector("automation", self.paradigm.automation),
             unit_direction=not program,
@@ -172,15 +131,15 @@ class TaskSettings:
 class TaskRule(NamedTuple):
     """What stays fixed during a trial; ``goals`` are as detected, ``items`` and ``targets`` as they are."""
 
-    goals: GoalRule
+    goals: goal_selection.GoalRule
     items: tuple[Vector, ...]
     targets: tuple[Vector, ...]
-    assist: AssistRule
+    assist: aan.AssistRule
     assist_maximum: float
-    fixed: FixedRule
+    fixed: fixed_assistance.FixedRule
     window: int
-    plant: PlantRule
-    gripper: GripperRule
+    plant: arm.PlantParameters
+    gripper: arm.GripperRule
     assistance: int
     automation: Vector
     unit_direction: bool
@@ -191,10 +150,10 @@ class TaskRule(NamedTuple):
 
 
 class TaskMemory(NamedTuple):
-    """Arrays that a trial overwrites: filter window, commands on their way, items (n, 3), releases (n, 4).
+    """Arrays that a trial overwrites: filter window, commands on their way, items (n, 3), releases (n, 2).
 
-    A row of ``releases`` holds time [s], distance of the tip from its target when the gripper was opened and
-    of the item from its target when it fell [m] (both horizontal), and time of the grasp [s].
+    A row of ``releases`` holds the time at which an item fell [s] and the horizontal distance of the tip from
+    its target when the gripper was opened [m].
     """
 
     window: NDArray[np.float64]
@@ -216,11 +175,11 @@ class TaskState(NamedTuple):
     """A trial between two samples."""
 
     sample: int
-    goal: GoalState
-    assist: AssistState
-    fixed: FixedState
-    plant: PlantState
-    gripper: GripperState
+    goal: goal_selection.GoalState
+    assist: aan.AssistState
+    fixed: fixed_assistance.FixedState
+    plant: arm.PlantState
+    gripper: arm.GripperState
     automatic: Vector
     desired: Vector
     force: Vector
@@ -229,83 +188,56 @@ class TaskState(NamedTuple):
     tally: Tally
 
 
-def task_memory(rule: TaskRule, scene: Scene) -> TaskMemory:
-    """Fresh arrays for one trial."""
-    return TaskMemory(
-        window=np.zeros(rule.window),
-        delayed=command_buffer(rule.plant, scene.start),
-        items=np.array(scene.items, dtype=float),
-        releases=np.full((len(scene.items), 4), np.nan),
-    )
-
-
-def task_start(rule: TaskRule, start: Vector) -> TaskState:
+def task_start(rule: TaskRule, start: Vector) -> tuple[TaskState, TaskMemory]:
     """A trial before its first sample: tip at rest, gripper open, no force."""
-    zero = (0.0, 0.0, 0.0)
-    first = rule.goals.items[0]
-    return TaskState(
+    items, first = np.array(rule.items, dtype=float), rule.goals.items[0]
+    delayed = delay_line(start, round(rule.plant.command_delay))
+    memory = TaskMemory(np.zeros(rule.window), delayed, items, np.full((len(items), 2), np.nan))
+    state = TaskState(
         sample=0,
-        goal=GoalState(0, 0, first, first),
-        assist=ASSIST_START,
-        fixed=FIXED_START,
-        plant=plant_start(start),
-        gripper=GripperState(NOTHING, -1.0),
+        goal=goal_selection.GoalState(0, 0, first, first),
+        assist=aan.ASSIST_START,
+        fixed=fixed_assistance.FIXED_START,
+        plant=arm.plant_start(start),
+        gripper=arm.GripperState(arm.NOTHING, -1.0),
         automatic=start,
         desired=start,
-        force=zero,
+        force=ZERO,
         magnitude=0.0,
         closed=False,
         tally=Tally(0.0, 0.0, 0.0, math.nan),
     )
+    return state, memory
 
 
 # --- One sample ----------------------------------------------------------------------------------------
 
 
 @inlined
-def horizontal(a: Vector, b: Vector) -> float:
-    """Distance of two points in the x-y plane [m]."""
-    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2)
-
-
-@inlined
 def carry(rule: TaskRule, items: NDArray[np.float64], before: int, after: int, tip: Vector) -> None:
     """Move the held item with the tip; a released one falls straight down to where it lay."""
-    moved = after if after != NOTHING else before
-    if moved != NOTHING:
+    moved = after if after != arm.NOTHING else before
+    if moved != arm.NOTHING:
         items[moved, 0], items[moved, 1] = tip[0], tip[1]
-        items[moved, 2] = tip[2] if after != NOTHING else rule.items[moved][2]
+        items[moved, 2] = tip[2] if after != arm.NOTHING else rule.items[moved][2]
 
 
 @inlined
 def assist(
-    rule: TaskRule,
-    assisted: AssistState,
-    fixed: FixedState,
-    window: NDArray[np.float64],
-    tip: Vector,
-    goal: Vector,
-) -> tuple[AssistState, FixedState, float, Vector]:
+    rule: TaskRule, state: TaskState, window: NDArray[np.float64], tip: Vector, goal: Vector
+) -> tuple[aan.AssistState, fixed_assistance.FixedState, float, Vector]:
     """The assistance of the paradigm: its states, |f| and the rendered force [N]."""
+    assisted, fixed = state.assist, state.fixed
+    if rule.assistance == UNASSISTED:
+        return assisted, fixed, 0.0, ZERO
     distance = distance_to_goal(tip, goal)
     if rule.assistance == AS_NEEDED:
-        assisted = assist_step(rule.assist, assisted, distance, 1.0)
+        assisted = aan.assist_step(rule.assist, assisted, distance, 1.0)
         magnitude = hooke_magnitude(assisted.stiffness, distance, rule.assist_maximum)
     else:
-        fixed = fixed_step(rule.fixed, fixed, window, distance, 1.0)
+        fixed = fixed_assistance.fixed_step(rule.fixed, fixed, window, distance, 1.0)
         magnitude = fixed.magnitude
     return assisted, fixed, magnitude, guidance_force(magnitude, tip, goal, rule.unit_direction)
-
-
-@inlined
-def approach_goal(automatic: Vector, goal: Vector) -> Vector:
-    """Let the automatic command close in on the goal, as the authors' program does."""
-    share = SAMPLE_TIME / (AUTOMATIC_LAG + SAMPLE_TIME)
-    return (
-        automatic[0] + share * (goal[0] - automatic[0]),
-        automatic[1] + share * (goal[1] - automatic[1]),
-        automatic[2] + share * (goal[2] - automatic[2]),
-    )
 
 
 @inlined
@@ -323,39 +255,34 @@ def task_step(
     ``closed``: the gripper's button is held. ``confirmed``: the operator reports an item in the gripper (the
     second button); heeded by the real variant, which cannot sense it.
     """
-    automatic = approach_goal(state.automatic, state.goal.goal)
+    automatic = arm.simulated_tip(state.automatic, state.goal.goal, AUTOMATIC_LAG)
     desired = desired_position(command, automatic, rule.automation)
-    plant = plant_step(rule.plant, state.plant, memory.delayed, desired)
+    plant = arm.plant_step(rule.plant, state.plant, memory.delayed, desired)
     tip = plant.tip
-    time = SAMPLE_TIME * (state.sample + 1)
 
     opening_error = state.tally.opening_error
     item = state.gripper.item
-    if item != NOTHING and state.closed and not closed:
-        opening_error = horizontal(tip, rule.targets[item])
+    if item != arm.NOTHING and state.closed and not closed:
+        off = difference(tip, rule.targets[item])
+        opening_error = size((off[0], off[1], 0.0))
     gripper = state.gripper
-    if closed or item != NOTHING:
-        gripper = gripper_step(rule.gripper, gripper, memory.items, tip, desired, closed, rng)
+    if closed or item != arm.NOTHING:
+        gripper = arm.gripper_step(rule.gripper, gripper, memory.items, tip, desired, closed, rng)
         carry(rule, memory.items, item, gripper.item, tip)
-    if item == NOTHING and gripper.item != NOTHING:
-        memory.releases[gripper.item, 3] = time
-    elif item != NOTHING and gripper.item == NOTHING and state.goal.phase == PLACING:
-        memory.releases[item, 0] = time
+    if item != arm.NOTHING and gripper.item == arm.NOTHING and state.goal.phase == PLACING:
+        memory.releases[item, 0] = SAMPLE_TIME * (state.sample + 1)
         memory.releases[item, 1] = opening_error
-        memory.releases[item, 2] = horizontal(tip, rule.targets[item])
 
-    tracked = tracked_tip(tip, rule.plant.tracking_noise, rng)
-    held = confirmed if rule.confirmed_by_hand else gripper.item != NOTHING
-    goal = goal_step(rule.goals, state.goal, tracked, held)
-    assisted, fixed, magnitude, force = state.assist, state.fixed, 0.0, (0.0, 0.0, 0.0)
-    if rule.assistance != UNASSISTED:
-        assisted, fixed, magnitude, force = assist(rule, assisted, fixed, memory.window, tracked, goal.goal)
+    tracked = arm.tracked_tip(tip, rule.plant.tracking_noise, rng)
+    held = confirmed if rule.confirmed_by_hand else gripper.item != arm.NOTHING
+    goal = goal_selection.goal_step(rule.goals, state.goal, tracked, held)
+    assisted, fixed, magnitude, force = assist(rule, state, memory.window, tracked, goal.goal)
 
-    size = distance_to_goal((0.0, 0.0, 0.0), force)
+    newton = size(force)
     tally = Tally(
-        path=state.tally.path + distance_to_goal(tip, state.plant.tip),
-        impulse=state.tally.impulse + SAMPLE_TIME * size,
-        peak_force=max(state.tally.peak_force, size),
+        path=state.tally.path + size(difference(state.plant.tip, tip)),
+        impulse=state.tally.impulse + SAMPLE_TIME * newton,
+        peak_force=max(state.tally.peak_force, newton),
         opening_error=opening_error,
     )
     return TaskState(
@@ -379,6 +306,18 @@ def delivered(rule: TaskRule, state: TaskState) -> bool:
     """Whether the last item has been released on its target."""
     last = state.goal.item >= len(rule.goals.items) - 1
     return state.goal.phase == END or (last and state.goal.phase == LIFTING_EMPTY)
+
+
+@inlined
+def operator_view(rule: TaskRule, state: TaskState, items: NDArray[np.float64]) -> View:
+    """What an operator sees and feels. Wanted: the target of the item in the gripper, else the next item."""
+    held = state.gripper.item != arm.NOTHING
+    if held:
+        wanted = rule.targets[state.gripper.item]
+    else:
+        following = state.goal.item + 1 if state.goal.phase == LIFTING_EMPTY else state.goal.item
+        wanted = row(items, min(following, len(items) - 1))
+    return View(state.plant.tip, state.desired, wanted, state.force, held, rule.automation)
 
 
 # --- The task for a hand from outside ------------------------------------------------------------------
@@ -450,8 +389,7 @@ class Trial:
         self.settings = settings
         self.rng = rng
         self.rule = settings.rule()
-        self.memory = task_memory(self.rule, settings.scene)
-        self.state = task_start(self.rule, settings.scene.start)
+        self.state, self.memory = task_start(self.rule, settings.scene.start)
         self.command: Vector = settings.scene.start
 
     def step(self, command: ArrayLike, gripper_closed: bool, confirm: bool | None = None) -> Sample:
@@ -476,43 +414,34 @@ class Trial:
         ValueError
             If the command has not three components.
         """
-        given = np.asarray(command, dtype=float)
-        if given.shape != (3,):
-            raise ValueError(f"command must have shape (3,), got {given.shape}")
+        given = numbers("command", command, (3,))
         good = bool(np.all(np.isfinite(given)))
         if good:
             self.command = vector("command", given)
-        holding = self.state.gripper.item != NOTHING
+        holding = self.state.gripper.item != arm.NOTHING
         confirmed = holding if confirm is None else bool(confirm)
         self.state = task_step(
             self.rule, self.state, self.memory, self.command, bool(gripper_closed), confirmed, self.rng
         )
-        return self._sample(not good)
-
-    @property
-    def done(self) -> bool:
-        """Whether the last item has been placed."""
-        return delivered(self.rule, self.state)
-
-    def _sample(self, held_command: bool) -> Sample:
         state = self.state
+        stiffness = {AS_NEEDED: state.assist.stiffness, FIXED: self.rule.fixed.stiffness}
         return Sample(
             time=SAMPLE_TIME * state.sample,
             tip=np.array(state.plant.tip),
             desired=np.array(state.desired),
             goal=np.array(state.goal.goal),
             force=np.array(state.force),
-            stiffness=state.assist.stiffness
-            if self.rule.assistance == AS_NEEDED
-            else self._fixed_stiffness(),
+            stiffness=stiffness.get(self.rule.assistance, 0.0),
             magnitude=state.magnitude,
-            motion=MOTIONS[state.assist.motion],
-            phase=PHASES[state.goal.phase],
+            motion=aan.MOTIONS[state.assist.motion],
+            phase=goal_selection.PHASES[state.goal.phase],
             item=state.gripper.item,
             items=self.memory.items.copy(),
             done=self.done,
-            held_command=held_command,
+            held_command=not good,
         )
 
-    def _fixed_stiffness(self) -> float:
-        return self.rule.fixed.stiffness if self.rule.assistance == FIXED else 0.0
+    @property
+    def done(self) -> bool:
+        """Whether the last item has been placed."""
+        return delivered(self.rule, self.state)

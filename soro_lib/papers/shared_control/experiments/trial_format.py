@@ -15,16 +15,17 @@ import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
-from soro_lib.checks import positive, vector
+from soro_lib.checks import one_of, positive, vector
 from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.controllers.shared_control.assist_as_needed import MOTIONS
 from soro_lib.controllers.shared_control.goal_selection import PHASES, goal_points
 from soro_lib.papers.shared_control.experiments.task import Scene, TaskSettings, Trial
-from soro_lib.papers.shared_control.world import EXPERT
+from soro_lib.papers.shared_control.world.people import EXPERT
 
 MAGIC = "# soro_lib trial 1"
 """First line of every trial file; the number is that of the format."""
@@ -35,7 +36,7 @@ SUFFIXES = (".csv", ".csv.gz", ".csv.part")
 MAXIMUM_ROWS = 360_000
 """Samples read at most: an hour at 100 Hz."""
 
-LARGEST = {"m": 5.0, "n": 100.0, "n_per_m": 10_000.0}
+LARGEST = {"m": 5.0, "N": 100.0, "N/m": 10_000.0}
 """Largest value believed, by unit: more is a file in other units."""
 
 HEADER = {
@@ -51,8 +52,7 @@ HEADER = {
     "items_m": "[m] centres of the items, in the order of the task",
     "targets_m": "[m] centres of their targets",
 }
-"""Entries of the header and their units; force_law, kind, view, seed and hand_stiffness_n_per_m may be left
-out."""
+"""Entries of the header and their units; those not `NEEDED` may be left out."""
 
 AXES = ("x", "y", "z")
 
@@ -62,6 +62,11 @@ VIEWS = ("above and front", "camera")
 
 def _axes(name: str, unit: str, meaning: str) -> dict[str, str]:
     return {f"{name}_{axis}_{unit.lower()}": f"[{unit}] {meaning}, {axis}" for axis in AXES}
+
+
+def unit_of(meaning: str) -> str:
+    """The unit with which the meaning of a column begins, "N/m" of "[N/m] stiffness"."""
+    return meaning[1:].partition("]")[0]
 
 
 COLUMNS = {
@@ -121,10 +126,8 @@ class TrialHeader:
     scene: Scene = field(default_factory=Scene)
 
     def __post_init__(self) -> None:
-        if self.paradigm not in PARADIGMS:
-            raise ValueError(f"paradigm must be one of {', '.join(PARADIGMS)}, got {self.paradigm!r}")
-        if self.view not in VIEWS:
-            raise ValueError(f"view must be one of {', '.join(VIEWS)}, got {self.view!r}")
+        one_of("paradigm", self.paradigm, PARADIGMS)
+        one_of("view", self.view, VIEWS)
         positive("hand_stiffness_n_per_m", self.hand_stiffness)
         for name in ("operator", "kind"):
             if not getattr(self, name):
@@ -133,12 +136,8 @@ class TrialHeader:
 
     def settings(self) -> TaskSettings:
         """The task as it was set."""
-        return TaskSettings(
-            PARADIGMS[self.paradigm],
-            environment=self.environment,  # type: ignore[arg-type]
-            force_law=self.force_law,  # type: ignore[arg-type]
-            scene=self.scene,
-        )
+        conditions: dict[str, Any] = {"environment": self.environment, "force_law": self.force_law}
+        return TaskSettings(PARADIGMS[self.paradigm], scene=self.scene, **conditions)
 
     def task(self) -> Trial:
         """The task before its first sample; what is left to chance depends on the seed alone."""
@@ -146,19 +145,7 @@ class TrialHeader:
 
     def text(self) -> str:
         """The comment lines at the top of a trial file."""
-        values = {
-            "paradigm": self.paradigm,
-            "environment": self.environment,
-            "force_law": self.force_law,
-            "operator": self.operator,
-            "kind": self.kind,
-            "view": self.view,
-            "seed": self.seed,
-            "hand_stiffness_n_per_m": self.hand_stiffness,
-            "start_m": self.scene.start,
-            "items_m": self.scene.items,
-            "targets_m": self.scene.targets,
-        }
+        values = {name: attrgetter(ATTRIBUTES.get(name, name))(self) for name in HEADER}
         entries = [f"# {name} = {json.dumps(value, ensure_ascii=False)}" for name, value in values.items()]
         return "\n".join([MAGIC, *entries]) + "\n"
 
@@ -171,42 +158,36 @@ class TrialHeader:
         ValueError
             If a line is no TOML, an entry is missing, unknown or out of bounds.
         """
-        if not lines or lines[0].strip() != MAGIC:
-            raise ValueError(
-                f'the first line must be "{MAGIC}", got {lines[0].strip()[:60] if lines else ""!r}'
-            )
+        first = lines[0].strip() if lines else ""
+        if first != MAGIC:
+            raise ValueError(f'the first line must be "{MAGIC}", got {first[:60]!r}')
         try:
             values = tomllib.loads("\n".join(line.lstrip("#").strip() for line in lines[1:]))
         except tomllib.TOMLDecodeError as error:
             raise ValueError(f"the header is not TOML: {error}") from None
-        for name in values:
-            if name not in HEADER:
-                raise ValueError(f"unknown entry {name!r} in the header; known are {', '.join(HEADER)}")
+        unknown = [name for name in values if name not in HEADER]
+        if unknown:
+            raise ValueError(f"unknown entry {unknown[0]!r} in the header; known are {', '.join(HEADER)}")
         for name, kind in ENTRY_TYPES.items():
             if name in values and not isinstance(values[name], kind):
                 raise ValueError(f"{name} must be {HEADER[name]}, got {values[name]!r}")
-        missing = [name for name in HEADER if name not in values and name not in OPTIONAL_ENTRIES]
+        missing = [name for name in NEEDED if name not in values]
         if missing:
             raise ValueError(f"the header lacks {', '.join(missing)}")
-        scene = Scene(
-            start=vector("start_m", values["start_m"]),
-            items=goal_points("items_m", values["items_m"], LARGEST["m"]),
-            targets=goal_points("targets_m", values["targets_m"], LARGEST["m"]),
-        )
-        return cls(
-            paradigm=values["paradigm"],
-            environment=values["environment"],
-            operator=values["operator"],
-            force_law=values.get("force_law", "printed"),
-            kind=values.get("kind", "own"),
-            view=values.get("view", "camera"),
-            seed=tuple(values.get("seed", ())),
-            hand_stiffness=float(values.get("hand_stiffness_n_per_m", EXPERT.hand_stiffness)),
-            scene=scene,
-        )
+        start = vector("start_m", values.pop("start_m"))
+        goals = [goal_points(name, values.pop(name), LARGEST["m"]) for name in ("items_m", "targets_m")]
+        stiffness = values.pop("hand_stiffness_n_per_m", EXPERT.hand_stiffness)
+        values |= {"seed": tuple(values.get("seed", ())), "hand_stiffness": float(stiffness)}
+        return cls(**values, scene=Scene(start, *goals))
 
 
-OPTIONAL_ENTRIES = ("force_law", "kind", "view", "seed", "hand_stiffness_n_per_m")
+ATTRIBUTES = {
+    "hand_stiffness_n_per_m": "hand_stiffness",
+    **{f"{name}_m": f"scene.{name}" for name in ("start", "items", "targets")},
+}
+"""Where a header's entry stands in `TrialHeader`, if not under its own name."""
+
+NEEDED = ("paradigm", "environment", "operator", "start_m", "items_m", "targets_m")
 ENTRY_TYPES: Mapping[str, Any] = {
     **dict.fromkeys(("paradigm", "environment", "force_law", "operator", "kind", "view"), str),
     **dict.fromkeys(("seed", "start_m", "items_m", "targets_m"), list),

@@ -16,23 +16,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from soro_lib.controllers.shared_control.goal_selection import END, LIFTING_EMPTY, PLACING
+from soro_lib.papers.shared_control.experiments import trial_format
 from soro_lib.papers.shared_control.experiments.metrics import (
     mean_assistance,
     placement_error,
     trajectory_length,
 )
 from soro_lib.papers.shared_control.experiments.simulation import METRICS, TRACE
-from soro_lib.papers.shared_control.experiments.trial_format import (
-    AXES,
-    COLUMNS,
-    LARGEST,
-    MAXIMUM_ROWS,
-    STATES,
-    SUFFIXES,
-    TrialError,
-    TrialHeader,
-    trial_columns,
-)
+from soro_lib.papers.shared_control.experiments.trial_format import TrialError, TrialHeader
 
 
 @dataclass(frozen=True)
@@ -57,14 +48,10 @@ class RecordedTrial:
     @property
     def trace(self) -> pd.DataFrame:
         """The samples as `trace_trial` gives them, for the same figures."""
-        samples = self.samples
-        gap = self.points("goal") - self.points("tip")
-        computed = {
-            "distance_m": np.linalg.norm(gap, axis=1),
-            "item": samples["item_held"] - 1.0,
-            "closed": samples["gripper_closed"],
-        }
-        return samples.assign(**computed)[list(TRACE)].astype(float)
+        distance = np.linalg.norm(self.points("goal") - self.points("tip"), axis=1)
+        item, closed = self.samples["item_held"] - 1.0, self.samples["gripper_closed"]
+        trace = self.samples.assign(distance_m=distance, item=item, closed=closed)
+        return trace[list(TRACE)].astype(float)
 
     @property
     def finished(self) -> bool:
@@ -82,7 +69,7 @@ class RecordedTrial:
     def points(self, name: str) -> NDArray[np.float64]:
         """Three columns of one quantity, shape (n, 3)."""
         unit = "n" if name == "force" else "m"
-        return self.samples[[f"{name}_{axis}_{unit}" for axis in AXES]].to_numpy(dtype=float)
+        return self.samples[[f"{name}_{axis}_{unit}" for axis in trial_format.AXES]].to_numpy(dtype=float)
 
     def metrics(self) -> dict[str, float]:
         """The metrics of the study, `METRICS`, by the functions that stand for Eqs. (9)-(11)."""
@@ -111,22 +98,19 @@ class RecordedTrial:
     def _releases(self, until: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Time [s] at which each item was placed and the tip's horizontal error [m] as the gripper opened."""
         samples = self.samples.iloc[:until]
-        held = samples["item_held"].to_numpy(dtype=int)
-        holding = np.concatenate([[0], held[:-1]])
-        closed = samples["gripper_closed"].to_numpy(dtype=bool)
-        opening = (holding > 0) & np.concatenate([[False], closed[:-1]]) & ~closed
-        placing = np.concatenate([[False], samples["phase"].to_numpy(dtype=int)[:-1] == PLACING])
+        held, closed = samples["item_held"], samples["gripper_closed"]
+        holding = held.shift(fill_value=0)
+        opening = (holding > 0) & (closed.shift(fill_value=0) == 1) & (closed == 0)
+        placing = samples["phase"].shift(fill_value=END) == PLACING
         tips = self.points("tip")
         times = np.full(len(self.header.scene.items), math.nan)
         errors = times.copy()
         for number, target in enumerate(self.header.scene.targets):
             release = np.flatnonzero((holding == number + 1) & (held == 0) & placing)
-            if len(release) == 0:
-                continue
-            times[number] = samples["time_s"].iloc[release[-1]]
-            opened = np.flatnonzero(opening[: release[-1] + 1])
-            if len(opened):
-                errors[number] = math.dist(tips[opened[-1], :2], target[:2])
+            if len(release):
+                times[number] = samples["time_s"].iloc[release[-1]]
+                opened = np.flatnonzero(opening[: release[-1] + 1])
+                errors[number] = math.dist(tips[opened[-1], :2], target[:2]) if len(opened) else math.nan
         return times, errors
 
     def replay(self) -> NDArray[np.float64]:
@@ -176,15 +160,13 @@ def load_trials(folder: str | Path) -> list[RecordedTrial]:
     folder = Path(folder)
     if not folder.is_dir():
         raise FileNotFoundError(f"no such folder of trials: {folder}")
-    paths = sorted(path for path in folder.iterdir() if path.name.endswith(SUFFIXES))
+    paths = sorted(path for path in folder.iterdir() if path.name.endswith(trial_format.SUFFIXES))
     return [load_trial(path) for path in paths if not (path.suffix == ".part" and _is_bare(path))]
 
 
 def _is_bare(path: Path) -> bool:
     """Whether a cut-off trial has no whole line of samples."""
-    text = _text(path)
-    whole = text[: text.rfind("\n") + 1].splitlines()
-    return sum(not line.startswith("#") for line in whole) < 2
+    return sum(not line.startswith("#") for line in _lines(path)) < 2
 
 
 def load_trial(path: str | Path) -> RecordedTrial:
@@ -199,32 +181,30 @@ def load_trial(path: str | Path) -> RecordedTrial:
         times that do not increase; the message names file, row (1 = first after the column names), column.
     """
     path = Path(path)
-    complete = not path.name.endswith(".part")
-    text = _text(path)
-    if not complete:
-        text = text[: text.rfind("\n") + 1]  # the machine may have died in the middle of a line
-    lines = text.splitlines()
+    lines = _lines(path)
     top = next((index for index, line in enumerate(lines) if not line.startswith("#")), len(lines))
     try:
         header = TrialHeader.parse(lines[:top])
     except ValueError as error:
         raise TrialError(f"{path.name}: {error}") from None
-    if len(lines) < top + 2:
+    rows, bound = len(lines) - top - 1, trial_format.MAXIMUM_ROWS
+    if rows < 1:
         raise TrialError(f"{path.name}: no samples")
-    if len(lines) - top - 1 > MAXIMUM_ROWS:
-        raise TrialError(f"{path.name}: {len(lines) - top - 1} samples, bound {MAXIMUM_ROWS}; cut the file")
+    if rows > bound:
+        raise TrialError(f"{path.name}: {rows} samples, bound {bound}; cut the file")
     try:
         raw = pd.read_csv(io.StringIO("\n".join(lines[top:])), dtype=str, keep_default_na=False)
     except pd.errors.ParserError as error:
         raise TrialError(f"{path.name}: not a table of comma-separated values ({error})") from None
-    return RecordedTrial(path, header, _checked(raw, header, path.name), complete)
+    return RecordedTrial(path, header, _checked(raw, header, path.name), path.suffix != ".part")
 
 
-def _text(path: Path) -> str:
-    """The text of a file, plain or compressed."""
+def _lines(path: Path) -> list[str]:
+    """The whole lines of a file, plain or compressed; the machine may have died in the middle of one."""
     try:
         content = path.read_bytes()
-        return (gzip.decompress(content) if path.suffix == ".gz" else content).decode("utf-8")
+        text = (gzip.decompress(content) if path.suffix == ".gz" else content).decode("utf-8")
+        return (text[: text.rfind("\n") + 1] if path.suffix == ".part" else text).splitlines()
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise TrialError(f"{path.name}: truncated or damaged gzip file ({error})") from None
     except UnicodeDecodeError as error:
@@ -233,10 +213,10 @@ def _text(path: Path) -> str:
 
 def _checked(raw: pd.DataFrame, header: TrialHeader, file: str) -> pd.DataFrame:
     """The samples as numbers, every column and value checked."""
-    columns = trial_columns(len(header.scene.items))
-    for name in columns:
+    columns = trial_format.trial_columns(len(header.scene.items))
+    for name, meaning in columns.items():
         if name not in raw.columns:
-            raise TrialError(f"{file}: {_absent(name, columns[name], list(raw.columns))}")
+            raise TrialError(f"{file}: {_absent(name, meaning, list(raw.columns))}")
     table = pd.DataFrame({name: _numbers(raw[name], file) for name in columns})
     times = table["time_s"].to_numpy()
     backward = np.flatnonzero(np.diff(times, prepend=0.0) <= 0)
@@ -251,30 +231,29 @@ def _checked(raw: pd.DataFrame, header: TrialHeader, file: str) -> pd.DataFrame:
     ):
         allowed = range(low, high + 1)
         _refuse(~table[name].isin(allowed), raw[name], file, f"is not a whole number from {low} to {high}")
-    for name in columns:
-        unit = columns[name][1:].partition("]")[0].lower().replace("/", "_per_")
-        if unit in LARGEST:
-            bound = f"is beyond {LARGEST[unit]:g}: is it in {columns[name].partition(']')[0]}]?"
-            _refuse(table[name].abs() > LARGEST[unit], raw[name], file, bound)
+    for name, meaning in columns.items():
+        unit = trial_format.unit_of(meaning)
+        largest = trial_format.LARGEST.get(unit, math.inf)
+        bound = f"is beyond {largest:g}: is it in [{unit}]?"
+        _refuse(table[name].abs() > largest, raw[name], file, bound)
     return table
 
 
 def _absent(name: str, meaning: str, present: list[str]) -> str:
     """What to say of a missing column: that it stands there in another unit, where it does."""
-    unit = meaning[1:].partition("]")[0]
+    unit = trial_format.unit_of(meaning)
     stem = name.removesuffix("_" + unit.lower().replace("/", "_per_"))
     for other in present:
-        if unit != "-" and other.startswith(stem + "_") and other not in COLUMNS:
+        if unit != "-" and other.startswith(stem + "_") and other not in trial_format.COLUMNS:
             return f"column {other} has the wrong unit; {name} in [{unit}] is needed"
     return f"column {name} is missing ({meaning})"
 
 
 def _numbers(column: pd.Series, file: str) -> pd.Series:
     """A column of text as finite numbers; states by their index."""
-    name = str(column.name)
-    if name in STATES:
-        _refuse(~column.isin(STATES[name]), column, file, f"is not one of {', '.join(STATES[name])}")
-        return column.map({state: index for index, state in enumerate(STATES[name])}).astype(int)
+    if states := trial_format.STATES.get(str(column.name)):
+        _refuse(~column.isin(states), column, file, f"is not one of {', '.join(states)}")
+        return column.map(states.index).astype(int)
     values = pd.to_numeric(column, errors="coerce")
     _refuse(~np.isfinite(values), column, file, "is not a finite number")
     return values.astype(float)
@@ -289,8 +268,6 @@ def _refuse(bad: pd.Series, column: pd.Series, file: str, why: str) -> None:
 
 # --- Into the study ---------------------------------------------------------------------------------------
 
-LABELS = ("environment", "kind", "paradigm", "operator", "trial", "law", "file", "complete")
-
 
 def trial_table(trials: Sequence[RecordedTrial]) -> pd.DataFrame:
     """One line per trial, as `simulate` gives it: labels, then `METRICS`.
@@ -301,22 +278,16 @@ def trial_table(trials: Sequence[RecordedTrial]) -> pd.DataFrame:
         Columns environment, kind, paradigm, operator, trial (counted within those), law, file, complete, then
         the metrics.
     """
+    person = ["environment", "kind", "paradigm", "operator"]
     rows = [
-        {
-            "environment": trial.header.environment,
-            "kind": trial.header.kind,
-            "paradigm": trial.header.paradigm,
-            "operator": trial.header.operator,
-            "law": trial.header.force_law,
-            "file": trial.path.name,
-            "complete": trial.complete,
-            **trial.metrics(),
-        }
+        {name: getattr(trial.header, name) for name in person}
+        | {"law": trial.header.force_law, "file": trial.path.name, "complete": trial.complete}
+        | trial.metrics()
         for trial in trials
     ]
-    table = pd.DataFrame(rows, columns=[*(name for name in LABELS if name != "trial"), *METRICS])
-    order = table.groupby(["environment", "kind", "paradigm", "operator"], sort=False).cumcount()
-    return table.assign(trial=order)[[*LABELS, *METRICS]]
+    table = pd.DataFrame(rows, columns=[*person, "law", "file", "complete", *METRICS])
+    table.insert(len(person), "trial", table.groupby(person, sort=False).cumcount())
+    return table
 
 
 def standing(
@@ -346,17 +317,7 @@ def standing(
         for kind, group in alike.groupby("kind", sort=False):
             for metric in metrics:
                 value, others = float(getattr(trial, metric)), group[metric].dropna()
-                rows.append(
-                    {
-                        "file": trial.file,
-                        "paradigm": trial.paradigm,
-                        "environment": trial.environment,
-                        "kind": kind,
-                        "metric": metric,
-                        "own": value,
-                        "crowd_median": float(others.median()),
-                        "below": float((others < value).mean()),
-                    }
-                )
+                labels = (trial.file, trial.paradigm, trial.environment, kind, metric)
+                rows.append((*labels, value, float(others.median()), float((others < value).mean())))
     names = ("file", "paradigm", "environment", "kind", "metric", "own", "crowd_median", "below")
     return pd.DataFrame(rows, columns=list(names))

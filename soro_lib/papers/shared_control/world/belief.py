@@ -7,6 +7,7 @@ import numpy as np
 
 from soro_lib.jit import inlined
 from soro_lib.papers.shared_control.world.people import Operator, Vector
+from soro_lib.papers.shared_control.world.vectors import ZERO
 
 BELIEF_CORRELATION = 0.6
 """Correlation of the depth error between consecutive goals [-]."""
@@ -32,7 +33,7 @@ def new_belief(rule: Operator, old: Belief, rng: np.random.Generator) -> Belief:
         up=half * rng.standard_normal(),
         depth=BELIEF_CORRELATION * old.depth + fresh * rng.standard_normal(),
         glance=0.0,
-        shift=(0.0, 0.0, 0.0),
+        shift=ZERO,
     )
 
 

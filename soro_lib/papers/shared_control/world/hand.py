@@ -6,15 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from soro_lib.jit import inlined
+from soro_lib.papers.shared_control.world import vectors
 from soro_lib.papers.shared_control.world.people import DEVICE_SCALE, SAMPLE_TIME, Operator, Vector
 
 HAND_STEPS = 4
 """Steps of the hand's mechanics per period (400 Hz)."""
 
-
 WANDER_TIME = 0.5
 """Correlation time of the slow drift of a held hand [s]."""
-
 
 TREMOR_FREQUENCY = 9.3
 """Physiological tremor [Hz]; textbooks give 8 to 12 Hz."""
@@ -51,17 +50,12 @@ def plan_submovement(
     """Start a submovement that covers part of the seen error, turned and scaled by what is misjudged."""
     sine, cosine = math.sin(rule.mapping_angle), math.cos(rule.mapping_angle)
     gain = rule.primary_gain * (1.0 - rule.passivity) / rule.gain_factor
-    noise = rule.motor_noise
     x = gain * (cosine * error[0] - sine * error[1]) / DEVICE_SCALE[0]
     y = gain * (sine * error[0] + cosine * error[1]) / DEVICE_SCALE[1]
     z = gain * error[2] / DEVICE_SCALE[2]
-    size = math.sqrt(x * x + y * y + z * z)
-    change = (
-        x + noise * size * rng.standard_normal(),
-        y + noise * size * rng.standard_normal(),
-        z + noise * size * rng.standard_normal(),
-    )
-    duration = rule.submovement_time + 0.1 * math.log2(1.0 + size / 0.005)
+    length = vectors.size((x, y, z))
+    change = vectors.scattered((x, y, z), rule.motor_noise * length, rng)
+    duration = rule.submovement_time + 0.1 * math.log2(1.0 + length / 0.005)
     return Movement(change, time, duration, movement.intention)
 
 
@@ -70,27 +64,10 @@ def intend(rule: Operator, movement: Movement, hand: Hand, time: float) -> Movem
     """Advance the intended position along the submovement; a yielding operator lets it drift to the hand."""
     now = minimum_jerk((time - movement.start) / movement.duration)
     before = minimum_jerk((time - SAMPLE_TIME - movement.start) / movement.duration)
-    give = SAMPLE_TIME / rule.yield_time
-    intention = (
-        movement.intention[0]
-        + (now - before) * movement.change[0]
-        + give * (hand.position[0] - movement.intention[0]),
-        movement.intention[1]
-        + (now - before) * movement.change[1]
-        + give * (hand.position[1] - movement.intention[1]),
-        movement.intention[2]
-        + (now - before) * movement.change[2]
-        + give * (hand.position[2] - movement.intention[2]),
-    )
+    intention = vectors.moved(movement.intention, now - before, movement.change)
+    give = vectors.difference(hand.position, movement.intention)
+    intention = vectors.moved(intention, SAMPLE_TIME / rule.yield_time, give)
     return Movement(movement.change, movement.start, movement.duration, intention)
-
-
-@inlined
-def felt_force(force: Vector, friction: float) -> Vector:
-    """What the device's friction leaves of a guidance force [N]."""
-    size = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
-    share = 1.0 - friction / size if size > friction else 0.0
-    return (share * force[0], share * force[1], share * force[2])
 
 
 @inlined
@@ -112,13 +89,9 @@ def hand_step(
     """One period of the compliant hand: it follows the intention, drifts, trembles and gives to the force."""
     keep = 1.0 - SAMPLE_TIME / WANDER_TIME
     fresh = rule.wander * math.sqrt(1.0 - keep * keep)
-    drift = (
-        keep * hand.drift[0] + fresh * rng.standard_normal(),
-        keep * hand.drift[1] + fresh * rng.standard_normal(),
-        keep * hand.drift[2] + fresh * rng.standard_normal(),
-    )
+    drift = vectors.scattered(vectors.scaled(keep, hand.drift), fresh, rng)
     tremor = rule.tremor * math.sin(2.0 * math.pi * TREMOR_FREQUENCY * time)
-    pull = felt_force(force, rule.device_friction)
+    pull = vectors.after_friction(force, rule.device_friction)
     x = pull_axis(rule, hand.position[0], hand.velocity[0], intention[0] + drift[0] + tremor, pull[0])
     y = pull_axis(rule, hand.position[1], hand.velocity[1], intention[1] + drift[1] + tremor, pull[1])
     z = pull_axis(rule, hand.position[2], hand.velocity[2], intention[2] + drift[2] + tremor, pull[2])
@@ -128,8 +101,4 @@ def hand_step(
 @inlined
 def hand_command(hand: Hand) -> Vector:
     """Position commanded by the device [m]."""
-    return (
-        DEVICE_SCALE[0] * hand.position[0],
-        DEVICE_SCALE[1] * hand.position[1],
-        DEVICE_SCALE[2] * hand.position[2],
-    )
+    return vectors.product(DEVICE_SCALE, hand.position)

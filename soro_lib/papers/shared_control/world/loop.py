@@ -1,12 +1,12 @@
 """One period of the operator: look, believe, move, press."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soro_lib.jit import inlined
+from soro_lib.papers.shared_control.world import vectors
 from soro_lib.papers.shared_control.world.belief import Belief, belief_error, new_belief, scaled_belief
 from soro_lib.papers.shared_control.world.decision import DECIDED_NOTHING, Decision, decide
 from soro_lib.papers.shared_control.world.hand import Hand, Movement, hand_step, intend, plan_submovement
@@ -53,67 +53,48 @@ class OperatorState(NamedTuple):
 def operator_start(tip: Vector) -> OperatorState:
     """An operator whose hand rests where the device commands the tip to stay."""
     rest = (tip[0] / DEVICE_SCALE[0], tip[1] / DEVICE_SCALE[1], tip[2] / DEVICE_SCALE[2])
-    zero = (0.0, 0.0, 0.0)
     return OperatorState(
         sample=0,
         think_until=0.0,
         last_held=True,
         resting=0.0,
-        belief=Belief(0.0, 0.0, 0.0, 0.0, zero),
-        movement=Movement(zero, -10.0, 1.0, rest),
-        hand=Hand(rest, zero, zero),
+        belief=Belief(0.0, 0.0, 0.0, 0.0, vectors.ZERO),
+        movement=Movement(vectors.ZERO, -10.0, 1.0, rest),
+        hand=Hand(rest, vectors.ZERO, vectors.ZERO),
         decision=DECIDED_NOTHING,
     )
 
 
 def picture_buffer(rule: Operator, tip: Vector) -> NDArray[np.float64]:
     """Ring buffer of the pictures on their way through the eye, filled with the tip at rest."""
-    return np.tile(np.asarray(tip, dtype=float), (max(round(rule.reaction_delay / SAMPLE_TIME), 1), 1))
+    return vectors.delay_line(tip, round(rule.reaction_delay / SAMPLE_TIME))
 
 
 @inlined
 def delayed_picture(pictures: NDArray[np.float64], sample: int, tip: Vector) -> tuple[Vector, float]:
     """The tip one reaction delay ago [m] and its speed then [m/s]; the new picture is stored."""
     count = len(pictures)
-    place, following = sample % count, (sample + 1) % count
-    seen = (pictures[place, 0], pictures[place, 1], pictures[place, 2])
-    x, y, z = (
-        pictures[following, 0] - seen[0],
-        pictures[following, 1] - seen[1],
-        pictures[following, 2] - seen[2],
-    )
-    speed = math.sqrt(x * x + y * y + z * z) / SAMPLE_TIME if count > 1 else 0.0
-    for axis in range(3):
-        pictures[place, axis] = tip[axis]
-    return seen, speed
+    seen, following = vectors.row(pictures, sample % count), vectors.row(pictures, (sample + 1) % count)
+    vectors.set_row(pictures, sample % count, tip)
+    return seen, vectors.size(vectors.difference(following, seen)) / SAMPLE_TIME if count > 1 else 0.0
 
 
 @inlined
-def heed_force(rule: Operator, belief: Belief, force: Vector, size: float) -> Belief:
+def heed_force(rule: Operator, belief: Belief, force: Vector) -> Belief:
     """Take a felt force for a hint and move the belief along it."""
     step = rule.cue_gain * SAMPLE_TIME
-    if step == 0.0 or size <= rule.felt_force:
+    if step == 0.0 or vectors.size(force) <= rule.felt_force:
         return belief
-    shift = (
-        belief.shift[0] + step * force[0],
-        belief.shift[1] + step * force[1],
-        belief.shift[2] + step * force[2],
-    )
+    shift = vectors.moved(belief.shift, step, force)
     return Belief(belief.right, belief.up, belief.depth, belief.glance, shift)
 
 
 @inlined
 def approach_rise(rule: Operator, goal: Vector, seen: Vector) -> float:
     """How much higher to aim while the tip is horizontally far from the goal [m]."""
-    across = math.sqrt((goal[0] - seen[0]) ** 2 + (goal[1] - seen[1]) ** 2)
+    across = vectors.size((goal[0] - seen[0], goal[1] - seen[1], 0.0))
     share = (across - APPROACH_NEAR) / (APPROACH_FAR - APPROACH_NEAR)
     return rule.approach_height * min(max(share, 0.0), 1.0)
-
-
-@inlined
-def distance(a: Vector, b: Vector) -> float:
-    """Euclidean distance of two points."""
-    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
 @inlined
@@ -144,11 +125,7 @@ def seen_error(rule: Operator, view: View, goal: Vector, seen: Vector) -> Vector
 
 @inlined
 def operator_step(
-    rule: Operator,
-    state: OperatorState,
-    pictures: NDArray[np.float64],
-    view: View,
-    rng: np.random.Generator,
+    rule: Operator, state: OperatorState, pictures: NDArray[np.float64], view: View, rng: np.random.Generator
 ) -> OperatorState:
     """One period of 10 ms: look, believe, move, press.
 
@@ -165,26 +142,25 @@ def operator_step(
         belief = Belief(belief.right, belief.up, belief.depth, glance, belief.shift)
 
     goal = believed_goal(rule, belief, view)
-    offset = distance(goal, seen)
+    offset = vectors.size(vectors.difference(goal, seen))
     machine = max(view.automation[0], view.automation[1], view.automation[2])
     resting = state.resting + SAMPLE_TIME if speed < RESTING_SPEED and machine > 0.0 else 0.0
     resigned = resting > rule.resignation and offset < RESIGNED_OFFSET
     looks_right = offset < 1.5 * rule.tolerance or resigned
-    size = distance(view.force, (0.0, 0.0, 0.0))
     if looks_right:
-        belief = heed_force(rule, belief, view.force, size)
+        belief = heed_force(rule, belief, view.force)
 
     movement = state.movement
     pause = rule.refractory / (1.0 - rule.passivity)
     ready = time >= movement.start + movement.duration + pause and time >= think_until
     if ready and speed <= rule.wait_speed:
         error = seen_error(rule, view, goal, seen)
-        if distance(error, (0.0, 0.0, 0.0)) > rule.tolerance:
+        if vectors.size(error) > rule.tolerance:
             movement = plan_submovement(rule, movement, error, time, rng)
 
     movement = intend(rule, movement, state.hand, time)
     hand = hand_step(rule, state.hand, movement.intention, view.force, time, rng)
-    pulled = rule.cue_gain > 0.0 and size > rule.felt_force
+    pulled = rule.cue_gain > 0.0 and vectors.size(view.force) > rule.felt_force
     decided = decide(rule, decision, looks_right and time >= think_until, pulled, view.held)
     if decision.closed and not decided.closed and not view.held:
         belief = scaled_belief(belief, 1.0 - rule.learn)

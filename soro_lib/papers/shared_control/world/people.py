@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-Vector = tuple[float, float, float]
+from soro_lib.checks import Vector, check_fields
 
 SAMPLE_TIME = 0.01
 """Period of the control loop [s]."""
@@ -118,53 +118,47 @@ class Operator:
     approach_height: float = 0.1
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if math.isnan(value):
-                raise ValueError(f"{field.name} must be a number, got nan")
-            if field.name != "mapping_angle" and value < 0:
-                raise ValueError(f"{field.name} must not be below 0, got {value!r}")
-            if field.name in POSITIVE and value == 0:
-                raise ValueError(f"{field.name} must be above 0")
-        for name in ("lag_model", "learn"):
-            if getattr(self, name) > 1:
-                raise ValueError(f"{name} must lie in [0, 1], got {getattr(self, name)!r}")
-        if self.passivity >= 1:
-            raise ValueError(f"passivity must lie in [0, 1), got {self.passivity!r}")
-        if not 0 < self.view_elevation < math.pi / 2:
-            raise ValueError(f"view_elevation must lie in (0, pi/2) rad, got {self.view_elevation!r}")
+        unsigned = [name for name in vars(self) if name != "mapping_angle"]
+        check_fields(self, *unsigned, at_least=0, at_most=math.inf)
+        check_fields(self, *ABOVE_ZERO, above=0, at_most=math.inf)
+        check_fields(self, "lag_model", "learn", at_most=1)
+        check_fields(self, "passivity", below=1)
+        check_fields(self, "view_elevation", above=0, below=math.pi / 2)
+        check_fields(self, "mapping_angle")
 
     def rule(self) -> Any:
         """The same fields as a named tuple of floats, which the compiled rules can take."""
         return OperatorRule(*(float(getattr(self, field.name)) for field in fields(self)))
 
 
-POSITIVE = (
+ABOVE_ZERO = (
     *("submovement_time", "primary_gain", "gain_factor", "tolerance", "wait_speed", "yield_time"),
     *("hand_mass", "hand_damping", "hand_stiffness"),
 )
-
 OperatorRule: Any = NamedTuple("OperatorRule", [(field.name, float) for field in fields(Operator)])  # type: ignore[misc]
 
 EXPERT = Operator()
-NAIVE = Operator(
-    reaction_delay=0.28,
-    refractory=0.55,
-    submovement_time=0.55,
-    primary_gain=0.80,
-    lag_model=0.4,
-    wait_speed=0.03,
-    motor_noise=0.10,
-    wander=0.0006,
-    lateral_error=0.008,
-    depth_error=0.050,
-    look_noise=0.012,
-    tolerance=0.020,
-    dwell=0.8,
-    press=0.35,
-    think=1.0,
-    learn=0.3,
-)
+NAIVE_AND_SPREAD: Mapping[str, tuple[float, float]] = {
+    "reaction_delay": (0.28, 0.15),
+    "refractory": (0.55, 0.2),
+    "submovement_time": (0.55, 0.15),
+    "wait_speed": (0.03, 0.3),
+    "motor_noise": (0.10, 0.3),
+    "wander": (0.0006, 0.3),
+    "tremor": (0.00005, 0.3),
+    "lateral_error": (0.008, 0.3),
+    "depth_error": (0.050, 0.4),
+    "look_noise": (0.012, 0.3),
+    "tolerance": (0.020, 0.2),
+    "dwell": (0.8, 0.3),
+    "press": (0.35, 0.15),
+    "think": (1.0, 0.3),
+    "hand_stiffness": (150.0, 0.4),
+}
+"""Median of naive users; standard deviation of the logarithm over people of either kind."""
+
+MEDIANS = {name: median for name, (median, _) in NAIVE_AND_SPREAD.items()}
+NAIVE = Operator(primary_gain=0.80, lag_model=0.4, learn=0.3, **MEDIANS)
 
 ATTITUDES: Mapping[str, Mapping[str, float]] = {
     "ignore": {},
@@ -194,11 +188,10 @@ class Population:
 
     def draw(self, rng: np.random.Generator) -> Operator:
         """One person: log-normal about the medians, normal for lag model and learning (clipped to [0, 1])."""
-        changes = {}
-        for name, spread in SPREADS.items():
-            median = getattr(self.typical, name)
-            factor = math.exp(spread * rng.standard_normal())
-            changes[name] = median * factor
+        changes = {
+            name: getattr(self.typical, name) * math.exp(spread * rng.standard_normal())
+            for name, (_, spread) in NAIVE_AND_SPREAD.items()
+        }
         for name in ("lag_model", "learn"):
             value = getattr(self.typical, name) + 0.1 * rng.standard_normal()
             changes[name] = min(max(value, 0.0), 1.0)
@@ -206,25 +199,6 @@ class Population:
         changes["mapping_angle"] = self.mapping_spread * rng.standard_normal()
         return replace(self.typical, **changes)
 
-
-SPREADS: Mapping[str, float] = {
-    "reaction_delay": 0.15,
-    "refractory": 0.2,
-    "submovement_time": 0.15,
-    "wait_speed": 0.3,
-    "motor_noise": 0.3,
-    "wander": 0.3,
-    "tremor": 0.3,
-    "lateral_error": 0.3,
-    "depth_error": 0.4,
-    "look_noise": 0.3,
-    "tolerance": 0.2,
-    "dwell": 0.3,
-    "press": 0.15,
-    "think": 0.3,
-    "hand_stiffness": 0.4,
-}
-"""Standard deviation of the logarithm of each parameter over people."""
 
 POPULATIONS = {
     "expert": Population(EXPERT, gain_spread=0.05, mapping_spread=math.radians(3.0)),

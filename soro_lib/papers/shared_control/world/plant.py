@@ -14,7 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soro_lib.checks import Vector, check_fields, number, vector
 from soro_lib.jit import inlined
+from soro_lib.papers.shared_control.world import vectors
+from soro_lib.papers.shared_control.world.people import SAMPLE_TIME
 from soro_lib.robots.soft_growing import (
     eversion_length,
     eversion_proxy,
@@ -23,38 +26,11 @@ from soro_lib.robots.soft_growing import (
     steering_coordinates,
 )
 
-Vector = tuple[float, float, float]
-
-SAMPLE_TIME = 0.01
-"""Period of the control loop [s] (Stroppa et al., Table 3: 100 Hz)."""
-
 TRACKING_RATE = 270.0
 """Rate of the motion capture [Hz] (Stroppa et al., Section 3.3.1)."""
 
 REFERENCE_LENGTH = 0.65
 """Length at which the gains and lags of the real arm are stated [m]: tip at the items."""
-
-
-class PlantRule(NamedTuple):
-    """`PlantParameters` as plain numbers, with the command delay in samples."""
-
-    real: bool
-    tip_lag: float
-    command_delay: int
-    steering_gain: float
-    steering_damping: float
-    steering_lag: float
-    cable_friction: float
-    eversion_gain: float
-    feed_forward: float
-    passive_growth: float
-    eversion_lag: float
-    maximum_speed: float
-    maximum_tilt: float
-    minimum_length: float
-    maximum_length: float
-    floor: float
-    tracking_noise: float
 
 
 @dataclass(frozen=True)
@@ -117,33 +93,23 @@ class PlantParameters:
     tracking_noise: float = 0.0
 
     def __post_init__(self) -> None:
-        may_be_zero = {
-            "command_delay",
-            "steering_damping",
-            "cable_friction",
-            "feed_forward",
-            "passive_growth",
-        }
-        may_be_zero |= {"tracking_noise"}
-        for name in (field.name for field in fields(self) if field.name != "real"):
-            value = getattr(self, name)
-            if math.isnan(value) or value < 0 or (value == 0 and name not in may_be_zero):
-                bound = "not below 0" if name in may_be_zero else "above 0"
-                raise ValueError(f"{name} must be {bound}, got {value!r}")
-        if self.maximum_tilt >= math.pi / 2:
-            raise ValueError(f"maximum_tilt must be below pi/2, got {self.maximum_tilt!r}")
-        if self.minimum_length >= self.maximum_length:
-            raise ValueError(
-                f"minimum_length must be below maximum_length = {self.maximum_length} m, "
-                f"got {self.minimum_length}"
-            )
+        check_fields(self, at_least=0, at_most=math.inf)
+        check_fields(self, *ABOVE_ZERO, above=0, at_most=math.inf)
+        check_fields(self, "maximum_tilt", below=math.pi / 2)
+        number("minimum_length", self.minimum_length, below=self.maximum_length)
 
-    def rule(self) -> PlantRule:
-        """Plain numbers for the compiled rules."""
-        values: dict[str, Any] = {field.name: float(getattr(self, field.name)) for field in fields(self)}
-        values["real"] = bool(self.real)
-        values["command_delay"] = round(self.command_delay / SAMPLE_TIME)
-        return PlantRule(**values)
+    def rule(self) -> Any:
+        """The same fields as a named tuple, which the compiled rules can take; command delay in samples."""
+        values = {name: float(value) for name, value in vars(self).items()}
+        delay = round(self.command_delay / SAMPLE_TIME)
+        return PlantRule(**values | {"real": bool(self.real), "command_delay": delay})
+
+
+ABOVE_ZERO = (
+    *("tip_lag", "steering_gain", "steering_lag", "eversion_gain", "eversion_lag"),
+    *("maximum_speed", "maximum_tilt", "minimum_length", "maximum_length", "floor"),
+)
+PlantRule: Any = NamedTuple("PlantRule", [(field.name, float) for field in fields(PlantParameters)])  # type: ignore[misc]
 
 
 def real_arm(tracking_noise: float | None = None) -> PlantParameters:
@@ -160,15 +126,15 @@ def real_arm(tracking_noise: float | None = None) -> PlantParameters:
 
 
 class PlantState(NamedTuple):
-    """Tip [m]; steering direction, its rate [1/s] and last error; length [m] and growth rate [m/s]."""
+    """Tip [m]; steering direction, its rate [1/s] and last error; length [m] and growth rate [m/s].
+
+    Direction, rate and error lie in the plane of the steering: their z is 0.
+    """
 
     tip: Vector
-    direction_x: float
-    direction_y: float
-    rate_x: float
-    rate_y: float
-    error_x: float
-    error_y: float
+    direction: Vector
+    rate: Vector
+    error: Vector
     length: float
     growth: float
     sample: int
@@ -177,7 +143,8 @@ class PlantState(NamedTuple):
 def plant_start(tip: Vector) -> PlantState:
     """The arm at rest with its tip at a point below the base."""
     length = math.hypot(*tip)
-    return PlantState(tip, tip[0] / length, tip[1] / length, 0.0, 0.0, 0.0, 0.0, length, 0.0, 0)
+    direction = (tip[0] / length, tip[1] / length, 0.0)
+    return PlantState(tip, direction, vectors.ZERO, vectors.ZERO, length, 0.0, 0)
 
 
 def control_error(
@@ -207,8 +174,7 @@ def control_error(
     ValueError
         If a position is malformed, or at the base, where no direction exists.
     """
-    tip = np.array(finite_point("actual", actual))
-    aim = np.array(finite_point("desired", desired))
+    tip, aim = np.array(vector("actual", actual)), np.array(vector("desired", desired))
     length = float(eversion_length(tip))
     if length == 0:
         raise ValueError("actual must not be the base: the body has no direction there")
@@ -221,12 +187,7 @@ def control_error(
 @inlined
 def simulated_tip(tip: Vector, desired: Vector, lag: float) -> Vector:
     """One period of the simulator's first-order tip, exact for the authors' step of 1 % per 10 ms."""
-    share = SAMPLE_TIME / (lag + SAMPLE_TIME)
-    return (
-        tip[0] + share * (desired[0] - tip[0]),
-        tip[1] + share * (desired[1] - tip[1]),
-        tip[2] + share * (desired[2] - tip[2]),
-    )
+    return vectors.towards(tip, SAMPLE_TIME / (lag + SAMPLE_TIME), desired)
 
 
 @inlined
@@ -242,90 +203,65 @@ def steering_command(gain: float, damping: float, length: float, error: float, e
 
 
 @inlined
-def limited(x: float, y: float, bound: float) -> tuple[float, float]:
-    """The vector (x, y), shortened to the bound where it is longer."""
-    size = math.sqrt(x * x + y * y)
-    scale = bound / size if size > bound else 1.0
-    return scale * x, scale * y
+def limited(a: Vector, bound: float) -> Vector:
+    """A vector, shortened to the bound where it is longer."""
+    length = vectors.size(a)
+    return vectors.scaled(bound / length if length > bound else 1.0, a)
 
 
 @inlined
-def after_friction(x: float, y: float, friction: float) -> tuple[float, float]:
-    """What Coulomb friction leaves of the command (x, y): nothing below it, the excess above."""
-    size = math.sqrt(x * x + y * y)
-    scale = 1.0 - friction / size if size > friction else 0.0
-    return scale * x, scale * y
-
-
-@inlined
-def real_tip(rule: PlantRule, state: PlantState, desired: Vector) -> PlantState:
+def real_tip(rule: PlantParameters, state: PlantState, desired: Vector) -> PlantState:
     """One period of the real arm: steer toward the proxy, evert the rest (supplement, Sections 4 and 5).
 
     The steering error is that of the proxy p = d L_a / L_d of Eqs. (6), (7) against the tip, divided by
     L_a, in the plane: the angle for small errors. The motors are left out: Eq. (1) maps their commands back
     to this plane without loss.
     """
-    wanted = max(math.sqrt(desired[0] ** 2 + desired[1] ** 2 + desired[2] ** 2), rule.minimum_length)
+    wanted = max(vectors.size(desired), rule.minimum_length)
     tilt_bound = math.sin(rule.maximum_tilt)
-    aim_x, aim_y = limited(desired[0] / wanted, desired[1] / wanted, tilt_bound)
-    error_x, error_y = aim_x - state.direction_x, aim_y - state.direction_y
-    last_x = state.error_x if state.sample > 0 else error_x
-    last_y = state.error_y if state.sample > 0 else error_y
+    aim = limited((desired[0] / wanted, desired[1] / wanted, 0.0), tilt_bound)
+    error = vectors.difference(aim, state.direction)
+    change = vectors.difference(error, state.error if state.sample > 0 else error)
     length, gain, damping = state.length, rule.steering_gain, rule.steering_damping
-    command_x = steering_command(gain, damping, length, error_x, (error_x - last_x) / SAMPLE_TIME)
-    command_y = steering_command(gain, damping, length, error_y, (error_y - last_y) / SAMPLE_TIME)
-    command_x, command_y = after_friction(command_x, command_y, gain * rule.cable_friction)
+    x = steering_command(gain, damping, length, error[0], change[0] / SAMPLE_TIME)
+    y = steering_command(gain, damping, length, error[1], change[1] / SAMPLE_TIME)
+    command = vectors.after_friction((x, y, 0.0), gain * rule.cable_friction)
 
     scale = length / REFERENCE_LENGTH
     share = SAMPLE_TIME / (rule.steering_lag * scale + SAMPLE_TIME)
-    rate_x = state.rate_x + share * (command_x / scale - state.rate_x)
-    rate_y = state.rate_y + share * (command_y / scale - state.rate_y)
-    rate_x, rate_y = limited(rate_x, rate_y, rule.maximum_speed / length)
-    x, y = limited(
-        state.direction_x + SAMPLE_TIME * rate_x, state.direction_y + SAMPLE_TIME * rate_y, tilt_bound
-    )
+    rate = vectors.towards(state.rate, share, (command[0] / scale, command[1] / scale, 0.0))
+    rate = limited(rate, rule.maximum_speed / length)
+    direction = limited(vectors.moved(state.direction, SAMPLE_TIME, rate), tilt_bound)
 
     growth_command = eversion_command(rule.eversion_gain, rule.feed_forward, wanted - length)
     share = SAMPLE_TIME / (rule.eversion_lag * scale + SAMPLE_TIME)
     growth = state.growth + share * (growth_command + rule.passive_growth - state.growth)
     growth = min(max(growth, -rule.maximum_speed), rule.maximum_speed)
-    down = math.sqrt(1.0 - x * x - y * y)
+    down = math.sqrt(1.0 - direction[0] * direction[0] - direction[1] * direction[1])
     longest = min(rule.maximum_length, rule.floor / down)
     length = min(max(length + SAMPLE_TIME * growth, rule.minimum_length), longest)
-    tip = (length * x, length * y, length * down)
-    return PlantState(tip, x, y, rate_x, rate_y, error_x, error_y, length, growth, state.sample + 1)
+    tip = vectors.scaled(length, (direction[0], direction[1], down))
+    return PlantState(tip, direction, rate, error, length, growth, state.sample + 1)
 
 
 @inlined
 def plant_step(
-    rule: PlantRule, state: PlantState, delayed: NDArray[np.float64], desired: Vector
+    rule: PlantParameters, state: PlantState, delayed: NDArray[np.float64], desired: Vector
 ) -> PlantState:
     """One period of the arm; ``delayed`` (n, 3) is the ring buffer of commands on their way."""
     if not rule.real:
         tip = simulated_tip(state.tip, desired, rule.tip_lag)
-        return PlantState(tip, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, state.sample + 1)
+        return PlantState(tip, vectors.ZERO, vectors.ZERO, vectors.ZERO, 0.0, 0.0, state.sample + 1)
     place = state.sample % len(delayed)
-    arriving = (delayed[place, 0], delayed[place, 1], delayed[place, 2])
-    for axis in range(3):
-        delayed[place, axis] = desired[axis]
+    arriving = vectors.row(delayed, place)
+    vectors.set_row(delayed, place, desired)
     return real_tip(rule, state, arriving)
 
 
 @inlined
 def tracked_tip(tip: Vector, noise: float, rng: np.random.Generator) -> Vector:
     """The tip as motion capture reports it (Stroppa et al., Section 3.3.1)."""
-    if noise == 0.0:
-        return tip
-    return (
-        tip[0] + noise * rng.standard_normal(),
-        tip[1] + noise * rng.standard_normal(),
-        tip[2] + noise * rng.standard_normal(),
-    )
-
-
-def command_buffer(rule: PlantRule, tip: Vector) -> NDArray[np.float64]:
-    """Ring buffer of the commands on their way, filled with the position of rest."""
-    return np.tile(np.asarray(tip, dtype=float), (max(rule.command_delay, 1), 1))
+    return vectors.scattered(tip, noise, rng) if noise > 0.0 else tip
 
 
 class SoftGrowingPlant:
@@ -351,12 +287,12 @@ class SoftGrowingPlant:
     """
 
     def __init__(self, parameters: PlantParameters, tip: ArrayLike = (0.0, 0.0, 0.1)) -> None:
-        start = finite_point("tip", tip)
+        start = vector("tip", tip)
         if start[2] <= 0:
             raise ValueError(f"tip must hang below the base (z > 0), got z = {start[2]} m")
         self.rule = parameters.rule()
         self.state = plant_start(start)
-        self.delayed = command_buffer(self.rule, start)
+        self.delayed = vectors.delay_line(start, self.rule.command_delay)
 
     def step(self, desired: ArrayLike) -> NDArray[np.float64]:
         """Command a position (3,) [m] for one period and return the tip (3,) [m] after it.
@@ -366,17 +302,8 @@ class SoftGrowingPlant:
         ValueError
             If the command is not three finite numbers.
         """
-        self.state = plant_step(self.rule, self.state, self.delayed, finite_point("desired", desired))
+        self.state = plant_step(self.rule, self.state, self.delayed, vector("desired", desired))
         return np.array(self.state.tip)
-
-
-def finite_point(name: str, value: ArrayLike) -> Vector:
-    """Three finite numbers, or a ValueError that names the argument."""
-    array = np.asarray(value, dtype=float)
-    if array.shape != (3,) or not np.all(np.isfinite(array)):
-        raise ValueError(f"{name} must be three finite numbers, got {array.tolist()}")
-    x, y, z = array.tolist()
-    return x, y, z
 
 
 # --- The soft magnetic gripper: Section 3.1, Fig. 3 ---------------------------------------------------------
@@ -413,8 +340,7 @@ def nearest_item(items: NDArray[np.float64], point: Vector) -> tuple[int, float]
     """Number of the nearest item and its distance [m]."""
     best, least = NOTHING, math.inf
     for index in range(len(items)):
-        x, y, z = items[index, 0] - point[0], items[index, 1] - point[1], items[index, 2] - point[2]
-        distance = math.sqrt(x * x + y * y + z * z)
+        distance = vectors.size(vectors.difference(vectors.row(items, index), point))
         if distance < least:
             best, least = index, distance
     return best, least

@@ -1,8 +1,12 @@
 """One implementation: the compiled trials are the readable classes, whatever the threads or machines."""
 
+import json
 import os
 import signal
+import subprocess
+import sys
 import threading
+from contextlib import contextmanager
 
 import numpy as np
 import pandas as pd
@@ -12,11 +16,8 @@ from soro_lib.controllers import AssistAsNeeded, FixedAssistance, GoalSelection
 from soro_lib.controllers.shared_control import PARADIGMS
 from soro_lib.controllers.shared_control.assist_as_needed import COUNTERS, MOTIONS
 from soro_lib.controllers.shared_control.goal_selection import PHASES
-from soro_lib.papers.shared_control.experiments.demonstrations import demonstration_plans, run_demonstrations
-from soro_lib.papers.shared_control.experiments.metrics import (
-    mean_assistance,
-    placement_error,
-    trajectory_length,
+from soro_lib.papers.shared_control.experiments.demonstrations import (
+    demonstration_plans,
 )
 from soro_lib.papers.shared_control.experiments.simulation import (
     METRICS,
@@ -25,10 +26,9 @@ from soro_lib.papers.shared_control.experiments.simulation import (
     play_trial,
     simulate,
     trace_trial,
-    trial_metrics,
 )
-from soro_lib.papers.shared_control.experiments.task import Scene, TaskSettings, Trial
-from soro_lib.papers.shared_control.world import EXPERT, NAIVE
+from soro_lib.papers.shared_control.experiments.task import Scene, TaskSettings
+from soro_lib.papers.shared_control.world.people import EXPERT, NAIVE
 from soro_lib.papers.shared_control.world.plant import PlantParameters, SoftGrowingPlant, real_arm
 
 CASES = [
@@ -104,64 +104,10 @@ def test_compiled_arm_is_the_readable_class(environment, plant):
     np.testing.assert_allclose(columns(trace, "tip_"), ours, rtol=0, atol=1e-12)
 
 
-def test_a_trial_from_outside_is_the_simulated_one():
-    """Replaying a simulated operator's commands and button through `Trial` gives the same trial."""
-    settings = TaskSettings(PARADIGMS["assist_as_needed"])
-    plan = TrialPlan(settings, EXPERT, (5,))
-    trace = trace_trial(plan)
-    trial = Trial(settings, np.random.default_rng(1))
-    commands = columns(trace, "command_")
-    samples = [
-        trial.step(command, bool(closed)) for command, closed in zip(commands, trace["closed"], strict=True)
-    ]
-    np.testing.assert_array_equal([sample.tip for sample in samples], columns(trace, "tip_"))
-    np.testing.assert_array_equal([sample.force for sample in samples], columns(trace, "force_"))
-    assert [sample.done for sample in samples] == [False] * (len(samples) - 1) + [True]
-
-
-def test_metrics_of_the_loop_are_the_equations():
-    settings = TaskSettings(PARADIGMS["fixed_assistance"])
-    plan = TrialPlan(settings, EXPERT, (5,))
-    rule = settings.rule()
-    trace = np.empty((24000, len(TRACE)))
-    state, memory = play_trial(plan, rule, 24000, trace)
-    metrics = dict(zip(METRICS, trial_metrics(rule, state, memory), strict=True))
-    table = pd.DataFrame(trace[: state.sample], columns=list(TRACE))
-    tips = np.vstack([settings.scene.start, columns(table, "tip_")])
-    assert metrics["path_m"] == pytest.approx(trajectory_length(tips))
-    force = mean_assistance(columns(table, "force_"), table["time_s"])
-    assert metrics["assistance_n"] == pytest.approx(force)
-    placed = 1e3 * placement_error(memory.items, settings.scene.targets)
-    assert metrics["placement_error_mm"] == pytest.approx(placed)
-    assert metrics["item1_time_s"] + metrics["item2_time_s"] == pytest.approx(metrics["time_s"])
-
-
-def test_printed_path_integral_is_only_the_displacement():
-    angle = np.linspace(0, 2 * np.pi, 1001)
-    circle = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    assert trajectory_length(circle) == pytest.approx(2 * np.pi, rel=1e-4)
-    np.testing.assert_allclose(np.diff(circle, axis=0).sum(axis=0), 0.0, atol=1e-12)
-
-
-def test_printed_assistance_and_error_need_the_norm_and_the_index():
-    forces = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
-    assert mean_assistance(forces, [1.0, 2.0]) == 1.0
-    np.testing.assert_array_equal(forces.mean(axis=0), 0.0)
-    items = np.array([[0.0, 0.0, 0.6], [1.0, 0.0, 0.6]])
-    assert placement_error(items, items) == 0.0  # eq. (11) prints one target t for both items
-    assert placement_error(items, np.tile(items[0], (2, 1))) == 0.5
-
-
 @pytest.mark.parametrize("options", [{"jobs": 2}, {"chunk": 7}, {"chunk": 1000, "jobs": 2}])
 def test_numbers_do_not_depend_on_threads_or_chunks(options):
     plans = list(demonstration_plans(1, seed=4, trials=2))
     pd.testing.assert_frame_equal(simulate(plans), simulate(plans, **options), check_exact=True)
-
-
-def test_the_first_people_are_the_same_however_many_there_are():
-    few, many = run_demonstrations(1, 2, trials=1), run_demonstrations(2, 2, trials=1)
-    same = many[many["operator"] == 0].reset_index(drop=True)
-    pd.testing.assert_frame_equal(few, same)
 
 
 def test_a_dead_worker_changes_nothing():
@@ -191,59 +137,6 @@ def test_a_dead_worker_changes_nothing():
     pd.testing.assert_frame_equal(again, simulate(plans[:20], chunk=4), check_exact=True)
 
 
-# --- The task for a hand from outside and bad input -------------------------------------------------
-
-
-def test_a_sample_that_is_not_a_number_holds_the_last_command():
-    trial = Trial(TaskSettings(), np.random.default_rng(1))
-    good = trial.step((0.1, 0.0, 0.5), gripper_closed=False)
-    held = trial.step((np.nan, 0.0, 0.5), gripper_closed=False)
-    assert not good.held_command
-    assert held.held_command
-    np.testing.assert_array_equal(held.desired, [0.1, 0.0, 0.5])
-    with pytest.raises(ValueError, match=r"command must have shape \(3,\)"):
-        trial.step((0.0, 1.0), gripper_closed=False)
-
-
-def test_the_real_arm_waits_for_the_operator_to_report_the_item():
-    trial = Trial(
-        TaskSettings(environment="real", scene=Scene(start=(-0.095, 0.117, 0.64))), np.random.default_rng(1)
-    )
-    here = (-0.095, 0.117, 0.645)
-    assert trial.step(here, True, confirm=False).item == 0
-    assert trial.step(here, True, confirm=False).phase == "grasping"
-    assert trial.step(here, True, confirm=True).phase == "placing"
-
-
-def test_a_dropped_item_falls_and_can_be_fetched():
-    trial = Trial(TaskSettings(PARADIGMS["msae"]), np.random.default_rng(1))
-    here = (-0.095, 0.117, 0.645)
-    for _ in range(800):
-        trial.step(here, False)
-    for _ in range(30):
-        sample = trial.step(here, True)
-    assert sample.phase == "lifting with item"
-    sample = trial.step(here, False)
-    assert sample.phase == "grasping"
-    np.testing.assert_allclose(sample.goal, [*sample.tip[:2], 0.645])
-    np.testing.assert_allclose(sample.items[0], sample.goal)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"environment": "imagined"}, "environment must be"),
-        ({"force_law": "guessed"}, "force_law must be"),
-        ({"scene": Scene(items=((0.0, 0.0, 3.0), (0.0, 0.0, 0.6)))}, r"items\[0\] is out of reach"),
-        ({"assist_as_needed": {"maximum_force": -1.0}}, "maximum_force"),
-        ({"detection_error": (np.nan, 0.0, 0.0)}, "detection_error must be finite"),
-    ],
-)
-def test_bad_settings_are_named(options, message):
-    with pytest.raises(ValueError, match=message):
-        TaskSettings(**options).rule()
-
-
 def test_bad_sweeps_are_named():
     with pytest.raises(ValueError, match="time_limit"):
         simulate([], time_limit=0.0)
@@ -259,10 +152,84 @@ def test_an_unfinished_trial_has_no_error():
     assert np.isnan(table["placement_error_mm"][0])
 
 
-def test_metrics_refuse_bad_records():
-    with pytest.raises(ValueError, match="times must be 2 increasing numbers"):
-        mean_assistance(np.zeros((2, 3)), [1.0, 1.0])
-    with pytest.raises(ValueError, match="row 1 is not"):
-        trajectory_length([[0, 0, 0], [0, np.nan, 0]])
-    with pytest.raises(ValueError, match=r"items must have shape \(n, 3\)"):
-        placement_error([0.0], [0.0])
+PEOPLE, SEED, CHUNK = 2, 6, 4
+
+
+MEMORY = """
+import json, sys
+import numpy as np
+from soro_lib.papers.shared_control.experiments import simulation
+from soro_lib.papers.shared_control.experiments.claims import claim_probabilities, evaluate_claims
+from soro_lib.papers.shared_control.experiments.demonstrations import effects, run_demonstrations, summary
+from soro_lib.papers.shared_control.figures import paper
+run_demonstrations(1, 1, trials=1)
+metrics = np.abs(np.random.default_rng(1).normal(20.0, 3.0, (250, len(simulation.METRICS))))
+simulation.simulate_chunk = lambda plans, time_limit: metrics[: len(plans)].copy()
+trials = run_demonstrations(3200, 1)
+summary(trials), effects(trials), claim_probabilities(evaluate_claims(trials))
+paper.fig07b_time(trials), paper.fig08_error_against_time(trials)
+# Not ru_maxrss, which begins with the memory of the process that started this one.
+status = dict(line.split(":") for line in open("/proc/self/status"))
+print(json.dumps([len(trials), int(status["VmHWM"].split()[0]) / 1024]))
+"""
+
+
+def plans(people=PEOPLE):
+    return demonstration_plans(people, seed=SEED, trials=2)
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """The sweep in one go, in this process."""
+    return simulate(plans(), chunk=CHUNK)
+
+
+def assert_same(one, other):
+    pd.testing.assert_frame_equal(one, other, check_exact=True)
+
+
+@contextmanager
+def cluster(workers, processes=False):
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=processes,
+            dashboard_address=None,
+            silence_logs=50,
+        ) as local,
+        distributed.Client(local) as client,
+    ):
+        yield client
+
+
+@pytest.mark.parametrize("workers", [2, 4])
+def test_a_cluster_gives_the_table_of_this_process(alone, tmp_path, workers):
+    with cluster(workers) as client:
+        assert_same(simulate(plans(), chunk=CHUNK, scheduler=client, store=tmp_path), alone)
+        assert_same(simulate(plans(), chunk=CHUNK, scheduler=client, store=tmp_path), alone)
+    assert_same(simulate(plans(), chunk=CHUNK, store=tmp_path), alone)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("workers", [2, 4])
+def test_a_cluster_of_processes_gives_the_table_of_this_process(workers):
+    with cluster(workers, processes=True) as client:
+        assert_same(simulate(plans(20), scheduler=client), simulate(plans(20), jobs=2))
+
+
+def test_text_labels_are_categories(alone):
+    text = ["environment", "kind", "paradigm"]
+    assert all(isinstance(alone[name].dtype, pd.CategoricalDtype) for name in text)
+    assert alone[text].memory_usage(index=False, deep=True).max() < len(alone) + 500
+    assert list(alone.columns) == [*text, "operator", "trial", *METRICS]
+
+
+@pytest.mark.soak
+def test_the_demonstrations_of_3200_people_stay_below_400_megabytes():
+    """384,000 trials through tables, claims and figures; what a trial computes is not the matter here."""
+    run = subprocess.run([sys.executable, "-c", MEMORY], capture_output=True, text=True, check=True)
+    trials, peak = json.loads(run.stdout.splitlines()[-1])
+    assert trials == 384_000
+    assert peak < 400

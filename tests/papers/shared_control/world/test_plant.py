@@ -151,7 +151,7 @@ def test_bad_parameters_are_named(name, value):
 def test_bad_positions_are_named():
     with pytest.raises(ValueError, match="tip must hang below the base"):
         SoftGrowingPlant(PlantParameters(), (0.0, 0.0, 0.0))
-    with pytest.raises(ValueError, match="desired must be three finite numbers"):
+    with pytest.raises(ValueError, match="desired must be finite"):
         SoftGrowingPlant(PlantParameters()).step((0.0, np.nan, 0.5))
     with pytest.raises(ValueError, match="actual must not be the base"):
         control_error((0.0, 0.0, 0.0), (0.0, 0.0, 0.5))
