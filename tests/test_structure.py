@@ -48,19 +48,19 @@ ACROSS = "soro_lib.papers.cross_robot"
 """The one room of a paper that may look into the others."""
 
 CODE_LINES = {
-    "soro_lib": 17_000,
-    "soro_lib/robots": 800,
-    "soro_lib/controllers": 1_700,
-    "soro_lib/estimators": 1_000,
-    "soro_lib/sensing": 1_500,
-    "soro_lib/worlds": 900,
-    "soro_lib/replication": 1_300,
-    "soro_lib/workbook": 1_400,
-    "soro_lib/papers/gesture_steering": 2_500,
-    "soro_lib/papers/shared_control": 2_500,
+    "soro_lib": 18_700,  # 17,000 is the aim
+    "soro_lib/robots": 750,
+    "soro_lib/controllers": 1_650,
+    "soro_lib/estimators": 900,
+    "soro_lib/sensing": 1_450,
+    "soro_lib/worlds": 400,
+    "soro_lib/replication": 1_250,  # the aim of both together is 1,700; pictures and tables that are the same
+    "soro_lib/workbook": 1_350,  # on every processor, and the golden copy, came after it and take 600
+    "soro_lib/papers/gesture_steering": 1_900,
+    "soro_lib/papers/shared_control": 2_800,  # the aim is 2,500
     "soro_lib/papers/visual_strain_fusion": 2_500,
-    "soro_lib/papers/soft_handover": 2_500,
-    "soro_lib/papers/cross_robot": 800,
+    "soro_lib/papers/soft_handover": 2_700,  # the aim is 2,500
+    "soro_lib/papers/cross_robot": 850,  # the aim is 500; half of it adapts laws that take only their own arm
 }
 """Budget of each folder in lines of Python that are neither blank, comment nor docstring.
 

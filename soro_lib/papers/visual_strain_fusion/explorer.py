@@ -13,7 +13,7 @@ import pandas as pd
 from IPython.display import Image
 
 from soro_lib.papers.visual_strain_fusion.experiments.camera_runs import FLIGHTS, load_flight
-from soro_lib.papers.visual_strain_fusion.experiments.camera_views import FlightViewer, View
+from soro_lib.papers.visual_strain_fusion.experiments.camera_views import CameraView, FlightViewer
 from soro_lib.papers.visual_strain_fusion.experiments.fusion_runs import blind, fuse_flight
 from soro_lib.papers.visual_strain_fusion.figures.camera import annotated, explorer_plots, fig06a_views
 from soro_lib.papers.visual_strain_fusion.world.motion import glued_shifts
@@ -78,7 +78,7 @@ class FusionExplorer(ipywidgets.VBox):
         """What the switch does to the moment shown; None if it does nothing."""
         return SWITCHES[self.switch.value] if self._in_window else None
 
-    def view(self) -> View:
+    def view(self) -> CameraView:
         """Return the picture of the moment shown, searched by the tracker."""
         return self._viewer.view(self._step, np.random.default_rng([self._seed, self._step]), self.conditions)
 
@@ -120,7 +120,7 @@ class FusionExplorer(ipywidgets.VBox):
         self.draw()
 
 
-def describe(view: View, moment: pd.Series) -> str:
+def describe(view: CameraView, moment: pd.Series) -> str:
     """Return a line of text about a moment: what the tracker found, and the errors of the three estimates."""
     names = {"camera": "camera", "fibre": "fibre", "fused": "fusion"}
     errors = ", ".join(f"{label} {moment[f'{name}_mm']:.2f} mm" for name, label in names.items())

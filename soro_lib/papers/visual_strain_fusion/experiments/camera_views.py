@@ -25,7 +25,7 @@ SIDE = Camera(1100, 620, focal_length=1000.0)
 
 
 @dataclass(frozen=True)
-class View:
+class CameraView:
     """One picture of a flight and what the tracker finds in it, with the map that the flight left.
 
     Attributes
@@ -81,7 +81,9 @@ class FlightViewer:
         noise = rng.standard_normal((ENDOSCOPE.height, ENDOSCOPE.width, *channels), dtype=np.float32)
         return surroundings.photograph(self.scene, self.motion.pose[step], conditions, noise)
 
-    def view(self, step: int, rng: np.random.Generator, conditions: ViewConditions | None = None) -> View:
+    def view(
+        self, step: int, rng: np.random.Generator, conditions: ViewConditions | None = None
+    ) -> CameraView:
         """Return the picture of a step with its features and inliers.
 
         Parameters
@@ -96,7 +98,7 @@ class FlightViewer:
         conditions = conditions or self.flight.timeline(self.motion.time[step])
         image = self.photograph(step, rng, conditions)
         frame = self._tracker.find(image, tip_camera(self.motion.pose[step]))
-        return View(float(self.motion.time[step]), conditions, image, frame)
+        return CameraView(float(self.motion.time[step]), conditions, image, frame)
 
 
 def stitch(images: Sequence[Image], poses: ArrayLike, sight: float = SIGHT) -> list[TexturedQuad]:

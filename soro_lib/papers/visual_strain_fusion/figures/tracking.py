@@ -14,7 +14,7 @@ from soro_lib.papers.visual_strain_fusion.experiments.tracking import GAINS, pat
 from soro_lib.papers.visual_strain_fusion.world.motion import PERIOD
 from soro_lib.papers.visual_strain_fusion.world.plant import Wall
 from soro_lib.replication.plotting import COLORS, PAGE_WIDTH, REFERENCE, label_axes, legend, new_figure
-from soro_lib.replication.published import load_published
+from soro_lib.replication.scorecard import build_scorecard
 
 MODEL: dict[str, Any] = {"color": COLORS["grey"], "linewidth": 1.0, "label": "model-based"}
 HYBRID: dict[str, Any] = {"color": COLORS["blue"], "linewidth": 1.2, "label": "hybrid"}
@@ -133,9 +133,9 @@ def tables12_learning_or_gain(summary: pd.DataFrame) -> Figure:
 def cap_or_no_cap(summaries: Mapping[str, pd.DataFrame]) -> Figure:
     """Draw the model-based error over the gain under several hypotheses about the 3 mm, and as published."""
     figure, axes = new_figure(PAGE_WIDTH, 3.2, columns=2)
-    published = load_published("visual_strain_fusion")
+    published = build_scorecard("visual_strain_fusion", {}).set_index("id")["published"]
     for panel, table, path in zip(axes, ("table1", "table2"), ("pentagram", "circle")):
-        cells = [published[f"{table}_kp{100 * gain:02.0f}_model_error_mean"].value for gain in GAINS]
+        cells = [published[f"{table}_kp{100 * gain:02.0f}_model_error_mean"] for gain in GAINS]
         panel.plot(GAINS, cells, "x", color=COLORS["black"], markersize=8, zorder=5, label="published")
         for name, summary in summaries.items():
             model = summary[(summary.controller == "model") & (summary.path == path)]
