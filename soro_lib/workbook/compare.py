@@ -8,6 +8,7 @@ import csv
 import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from soro_lib.replication import policy
@@ -15,7 +16,6 @@ from soro_lib.replication.picture import stored_digest
 from soro_lib.replication.tabular import TableError, read_rows
 
 EXCEPTION_COLUMNS = ("file", "row", "column", "reason")
-ANY = "*"
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class StatedException:
-    """A difference that is wanted, with the reason; ``*`` stands for every row or column."""
+    """A difference that is wanted, with the reason; in each field ``*`` stands for anything."""
 
     file: str
     row: str
@@ -58,7 +58,9 @@ class StatedException:
         """Tell whether a difference is the one that is stated."""
         stated = (self.file, self.row, self.column)
         found = (difference.file, difference.row, difference.column)
-        return all(word in (ANY, other) for word, other in zip(stated, found, strict=True))
+        return all(
+            word == other or fnmatchcase(other, word) for word, other in zip(stated, found, strict=True)
+        )
 
 
 def load_exceptions(path: Path) -> list[StatedException]:

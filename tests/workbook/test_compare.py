@@ -151,6 +151,14 @@ def test_stated_exceptions_are_left_out(before, tmp_path, capsys):
     stated.write_text("file,row,column,reason\npaper/table1.csv,*,error_mm,another rule\n")
     assert run(before, after, "--except", stated) == 0
     assert capsys.readouterr().out == "no differences but for 2 stated ones\n"
+    stated.write_text("file,row,column,reason\npaper/*.csv,*,error_*,another rule\n")
+    assert run(before, after, "--except", stated) == 0
+
+
+def test_a_row_with_brackets_is_stated_as_it_is_written():
+    difference = compare.Difference("t.csv", "[1, 2]", "x", "1", "2")
+    assert compare.without([difference], [compare.StatedException("t.csv", "[1, 2]", "x", "why")]) == []
+    assert compare.without([difference], [compare.StatedException("t.csv", "1", "x", "why")]) == [difference]
 
 
 @pytest.mark.parametrize("text", ["file,row\n", "file,row,column,reason\na.csv,*,*,\n"])
