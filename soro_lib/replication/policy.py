@@ -1,4 +1,4 @@
-"""What "the same number" means: every tolerance of the reporting floor, in one place."""
+"""What "the same number" means: every tolerance of tables and scorecards, in one place."""
 
 import math
 

@@ -1,4 +1,8 @@
-"""The runner of the notebooks and all other commands: ``python -m soro_lib.workbook --help``."""
+"""The runner of the notebooks and all other commands: ``python -m soro_lib.workbook --help``.
+
+Here belongs what works on whole notebooks, outputs and checkouts; it imports no paper. What a notebook itself
+uses belongs to ``replication``.
+"""
 
 import sys
 
