@@ -94,9 +94,11 @@ def finite(
 def number(name: str, value: float, **bounds: Unpack[Bounds]) -> float:
     """Return one finite number within bounds, or raise a ValueError that names it and the bound."""
     try:
-        single = float(value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be a number, got {value!r}") from None
+        single = float(value) if not isinstance(value, str | bytes) else None
+    except (TypeError, ValueError, OverflowError):
+        single = None
+    if single is None:
+        raise ValueError(f"{name} must be a number, got {value!r}")
     if not _within(single, bounds):
         raise ValueError(f"{name} must be {_phrase(bounds)}, got {value}")
     return single

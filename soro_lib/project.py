@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +17,8 @@ def slugs(root: Path = ROOT) -> tuple[str, ...]:
 
     A paper is a folder of ``data`` with a ``card.toml``.
     """
+    import tomllib  # every import of the library comes past here
+
     cards = {path.parent.name: path.read_text(encoding="utf-8") for path in root.glob("data/*/card.toml")}
     return tuple(sorted(cards, key=lambda slug: tomllib.loads(cards[slug])["number"]))
 

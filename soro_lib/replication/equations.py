@@ -1,6 +1,7 @@
 """The equation index and the errata of a paper: which function is which equation, and which test holds it."""
 
 import ast
+import re
 from collections.abc import Callable
 from pathlib import Path
 from pkgutil import resolve_name
@@ -82,7 +83,7 @@ def find_function(dotted_path: str) -> Any:
     LookupError
         If it does not exist or lies outside `soro_lib`.
     """
-    if not dotted_path.startswith("soro_lib."):
+    if not re.fullmatch(r"soro_lib(\.\w+)+", dotted_path):
         raise LookupError(f"function {dotted_path!r} must begin with soro_lib")
     try:
         found = resolve_name(dotted_path)

@@ -38,6 +38,7 @@ class MarkerRing:
 
     def __post_init__(self) -> None:
         check_fields(self, "sides", at_least=3)
+        check_fields(self, "width", "height", above=0)
         check_fields(self, "marker", above=0, below=min(self.width, self.height))
 
     @property

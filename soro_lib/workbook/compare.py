@@ -95,7 +95,7 @@ def outputs(place: Path, quick: bool = False) -> Path:
     """
     inside = ("build/quick", "quick") if quick else ("figures",)
     found = next((place / name for name in inside if (place / name).is_dir()), place)
-    if not _files(found):
+    if (found / "pyproject.toml").is_file() or not _files(found):
         raise FileNotFoundError(f"no tables or pictures in {found}; run the notebooks first")
     return found
 
@@ -154,8 +154,15 @@ def _file_differences(name: str, before: Path, after: Path, exact: bool) -> list
 
 
 def _table(path: Path) -> list[list[str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.reader(file))
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.reader(file))
+    except UnicodeDecodeError as error:
+        raise TableError(f"{path}: not UTF-8 at byte {error.start}") from None
+    for line, row in enumerate(rows, start=1):
+        if len(row) != len(rows[0]):
+            raise TableError(f"{path}, line {line}: {len(row)} cells, the header has {len(rows[0])}")
+    return rows
 
 
 def _table_differences(

@@ -29,6 +29,9 @@ from soro_lib.workbook.notebooks import find_notebooks
 STATED = ROOT / "tests" / "golden"
 """What a checkout states about its golden copy: the commit, wanted differences, new names of tests."""
 
+WRITERS = ("generator", "source")
+"""Keys of a data card, or of fitted values, that name the module that wrote them."""
+
 BENCHMARK_RUNS = 5
 """The golden time of a benchmark is the best of so many runs."""
 
@@ -150,10 +153,21 @@ def unresolved(names: Iterable[str], tree: Path = ROOT) -> list[str]:
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """Return the size and digest of every file below a folder, by its path there."""
+    """Return the size and digest of every file below a folder, by its path there.
+
+    Of TOML files the values count, but for those that name the module that wrote them, which may move.
+    """
     files = sorted(path for path in folder.rglob("*") if path.is_file())
-    contents = {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+    contents = {path.relative_to(folder).as_posix(): _content(path) for path in files}
     return {name: f"{len(data)} {hashlib.sha256(data).hexdigest()}" for name, data in contents.items()}
+
+
+def _content(path: Path) -> bytes:
+    data = path.read_bytes()
+    if path.suffix != ".toml":
+        return data
+    values = tomllib.loads(data.decode())
+    return repr({name: value for name, value in values.items() if name not in WRITERS}).encode()
 
 
 def lost_tests(before: Sequence[str], now: Sequence[str], renames: Mapping[str, str]) -> list[str]:
@@ -221,14 +235,14 @@ def unchanged(quick: bool = False, root: Path = ROOT) -> list[str]:
         f"{name} can no longer be imported" for name in unresolved(_lines(folder / "imports.txt"), root)
     ]
     if not quick:
-        problems += _changed_data(folder / "small", root / "build" / "small", stated)
+        problems += _changed_data(folder / "small", root / "build" / "small")
     return problems
 
 
-def _changed_data(golden: Path, again: Path, stated: Sequence[compare.StatedException]) -> list[str]:
-    """Make the small form of data and calibrations again and compare it byte by byte."""
+def _changed_data(golden: Path, again: Path) -> list[str]:
+    """Make the small form of data and calibrations again and compare it."""
     shutil.rmtree(again, ignore_errors=True)
-    problems: list[str] = []
+    problems = []
     for kind in FILES:
         if not (golden / kind).is_dir():
             continue
@@ -236,11 +250,11 @@ def _changed_data(golden: Path, again: Path, stated: Sequence[compare.StatedExce
         if _run(ROOT, sys.executable, "-m", "soro_lib.workbook", "generate", kind, "--small", *output):
             problems.append(f"make {kind}, small form, fails")
         before, now = digests(golden / kind), digests(again / kind)
-        changed = sorted(name for name in before.keys() | now.keys() if before.get(name) != now.get(name))
-        found = [
-            compare.Difference(f"small/{kind}/{name}", "", "", "one file", "another") for name in changed
+        problems += [
+            f"small form of {kind}: {name} is no longer the same"
+            for name in sorted(before.keys() | now.keys())
+            if before.get(name) != now.get(name)
         ]
-        problems += map(str, compare.without(found, stated))
     return problems
 
 

@@ -10,6 +10,7 @@ import pytest
 from soro_lib.project import ROOT
 
 READER = "soro_lib.replication.published"
+OLD_READER = "soro_lib.reporting.published"
 CALIBRATION = r"soro_lib/papers/\w+/calibration\.py"
 ALLOWED = {"soro_lib/replication/published.py", "soro_lib/replication/scorecard.py"}
 
@@ -35,7 +36,10 @@ def reads_published(code: str) -> bool:
             case ast.Import(names=aliases):
                 found = any(alias.name.startswith(READER) for alias in aliases)
             case ast.ImportFrom(module=module, names=aliases):
-                found = any(f"{module}.{alias.name}".startswith(READER) for alias in aliases)
+                names = {alias.name for alias in aliases}
+                found = any(f"{module}.{name}".startswith((READER, OLD_READER)) for name in names)
+                found = found or bool(names & {"load_published", "read_published"})
+                found = found or str(module).endswith("published")
             case ast.Attribute(attr=name):
                 found = name in ("load_published", "read_published")
             case ast.Constant(value=str(text)) if id(node) not in prose:
@@ -59,6 +63,9 @@ def test_only_scorecard_and_calibrations_read_published_values():
         "import soro_lib.replication.published",
         "from soro_lib.replication.published import load_published",
         "from soro_lib.replication import published",
+        "from ...replication.published import COLUMNS",
+        "from soro_lib.reporting.published import COLUMNS",
+        "from soro_lib.replication.scorecard import load_published",
         "import pandas as pd\npd.read_csv('data/x/published.csv')",
         "import soro_lib.replication as r\nr.scorecard.load_published('x')",
         "import importlib\nimportlib.import_module('soro_lib.replication.published')",

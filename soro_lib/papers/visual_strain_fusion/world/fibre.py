@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soro_lib.checks import not_negative, positive
+from soro_lib.checks import finite, not_negative, positive
 
 Array = NDArray[np.float64]
 
@@ -63,9 +63,8 @@ class FibreGratings:
             positive(name, getattr(self, name))
         for name in ("first", "noise", "ballooning"):
             not_negative(name, getattr(self, name))
-        gain = self.bond_gain
-        if gain.shape != (self.gratings,) or not (np.isfinite(gain) & (gain > 0)).all():
-            raise ValueError(f"bond_gain must be {self.gratings} finite values above 0, got {gain}")
+        gain = finite("bond_gain", self.bond_gain, (self.gratings,), above=0)
+        object.__setattr__(self, "bond_gain", gain)
         if self.height[-1] > self.length:
             raise ValueError(f"the last grating lies at {self.height[-1]:.4f} m, beyond length {self.length}")
 
