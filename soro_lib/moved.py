@@ -4,6 +4,8 @@
 two releases.
 """
 
+from __future__ import annotations
+
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -12,7 +14,10 @@ from importlib import import_module
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+
+TYPE_CHECKING = False  # that of typing would make every import of the library a third slower
+if TYPE_CHECKING:
+    from typing import Any
 
 
 @cache
@@ -87,4 +92,4 @@ class OldModules:
 def install() -> None:
     """Let Python ask here for modules that it finds nowhere else."""
     if not any(type(finder).__name__ == OldModules.__name__ for finder in sys.meta_path):
-        sys.meta_path.append(OldModules())  # type: ignore[arg-type]
+        sys.meta_path.append(OldModules())
